@@ -24,36 +24,25 @@ def directions(times: Array) -> Array:
     return np.stack([np.ones_like(times), retarded, times * retarded])
 
 
-def test_the_chance_of_a_correlation_is_of_a_beta_distribution() -> None:
-    """Its moments are of dense matrices, for a fit of three parameters."""
+def test_chances_are_of_beta_distributions_with_moments_of_dense_matrices() -> None:
+    """Of neighbours' differences and of means of four stretches, for a fit of three parameters."""
     basis = absorbed(directions(np.arange(1, 24) / 23))
     leaves = np.eye(23) - basis.T @ basis
     residual = leaves @ np.random.default_rng(0).standard_normal(23)
-    rows = np.diff(np.eye(23), axis=0)
-    of_noise = leaves @ rows.T @ rows
-    mean = np.trace(of_noise) / 20
-    variance = 2 * (np.trace(of_noise @ of_noise) - 20 * mean**2) / (20 * 22)
-    weight = mean * (4 - mean) / variance - 1
-    ratio = np.sum((rows @ residual) ** 2) / np.sum(residual**2)
-    of_beta = beta(mean / 4 * weight, (1 - mean / 4) * weight, 0, 4)
-    expected = 1 - ratio / mean, of_beta.cdf(ratio)
-    assert whiteness.correlated(residual, basis) == pytest.approx(expected)
-
-
-def test_wandering_is_an_f_test_of_levels_over_stretches() -> None:
-    """Of four stretches, each with a level that is fitted along with three parameters."""
-    slopes = directions(np.arange(1, 24) / 23)
-    trace = np.random.default_rng(0).standard_normal(23)
+    differences = np.diff(np.eye(23), axis=0)
     parts = np.array_split(np.eye(23), 4)
-    both: Array = np.vstack((slopes, [part.sum(axis=0) for part in parts]))
-    left, further = (
-        np.sum((trace - of.T @ np.linalg.lstsq(of.T, trace)[0]) ** 2) for of in (slopes, both)
-    )
-    more, free = np.linalg.matrix_rank(both) - 3, 23 - np.linalg.matrix_rank(both)
-    expected = fisher.sf((left - further) / more / (further / free), more, free)
-    basis = absorbed(slopes)
-    found = whiteness.wandering(trace - trace @ basis.T @ basis, basis)
-    assert found == pytest.approx(expected)
+    means = np.array([part.sum(axis=0) / len(part) ** 0.5 for part in parts])
+    found = []
+    for rows, most in ((differences, 4.0), (means, 1.0)):
+        of_noise = leaves @ rows.T @ rows
+        mean = np.trace(of_noise) / 20
+        variance = 2 * (np.trace(of_noise @ of_noise) - 20 * mean**2) / (20 * 22)
+        weight = mean * (most - mean) / variance - 1
+        ratio = np.sum((rows @ residual) ** 2) / np.sum(residual**2)
+        of_beta = beta(mean / most * weight, (1 - mean / most) * weight, 0, most)
+        found.append((1 - ratio / mean, of_beta.cdf(ratio)))
+    assert whiteness.correlated(residual, basis) == pytest.approx(found[0])
+    assert whiteness.wandering(residual, basis) == pytest.approx(1 - found[1][1])
 
 
 def test_of_two_means_a_fit_of_the_constant_leaves_their_difference() -> None:

@@ -1,9 +1,10 @@
 """Tests of what a fit leaves, each with its chance in white noise for the trace's own fit.
 
 A fit of p parameters to n readings leaves M e of white noise e, where M = 1 - Q^T Q projects out
-the directions Q that it absorbs. So the ratio e^T M A M e / e^T M e of successive differences has
-moments that are traces of M A, and follows nearly a beta distribution with the same mean and
-variance [1]_: it tests for correlation. F tests tell what is slow, by means over stretches.
+the directions Q that it absorbs. So ratios of quadratic forms of residuals, e^T M A M e / e^T M e,
+have moments that are traces of M A, and follow nearly a beta distribution with the same mean and
+variance [1]_. That of successive differences tests for correlation, that of means over stretches
+for what is slow.
 
 A step of all readings from some time on is one direction more: its share of the sum of squares is
 beta-distributed in white noise. `find_step` scans all times; the chance that a scan of correlated
@@ -57,10 +58,8 @@ def correlated(residual: Array, basis: Array) -> tuple[float, float]:
     correlation 1 - d/2 relative to the mean of d; the chance is that of a smaller d. A fit that
     absorbs all but one direction leaves nothing to chance.
     """
-    from scipy.special import betainc
-
-    n, free = len(residual), len(residual) - len(basis)
-    if free < 2:
+    n = len(residual)
+    if n - len(basis) < 2:
         return 0.0, 1.0
     observed = float(np.sum(np.diff(residual) ** 2) / np.sum(residual**2))
     differences = np.diff(basis)
@@ -71,21 +70,38 @@ def correlated(residual: Array, basis: Array) -> tuple[float, float]:
     within = differences @ differences.T
     first = 2 * (n - 1) - float(np.trace(within))
     second = 2 * (3 * n - 4) - 2 * float(np.sum(through**2)) + float(np.sum(within**2))
-    mean, variance = first / free, 2 * (second - first**2 / free) / (free * (free + 2))
-    # As a share of 4, which it does not exceed.
-    share = mean / 4
-    weight = share * (1 - share) / (variance / 16) - 1
-    chance = betainc(share * weight, (1 - share) * weight, min(observed / 4, 1.0))
-    return 1 - observed * free / first, float(chance)
+    free = n - len(basis)
+    chance = _chance_of_less(observed, first, second, free, 4.0)
+    return 1 - observed * free / first, chance
 
 
 def wandering(residual: Array, basis: Array) -> float:
     """Return the chance of means over stretches of white noise that scatter as much.
 
-    The test detects parts of the spectrum below some ten periods a trace, however small they are
-    beside single readings' noise.
+    The statistic is the share of the sum of squares that these means have. The test detects parts
+    of the spectrum below some ten periods a trace, however small they are beside single readings'
+    noise.
     """
-    return _chance_of_more(residual, basis, averaged(basis))
+    n, count = len(residual), min(_STRETCHES, len(residual) // _SHORTEST)
+    if count < 2:
+        return 1.0
+    sizes = np.array([len(part) for part in np.array_split(residual, count)])
+    starts = np.append(0, np.cumsum(sizes)[:-1])
+
+    def averaged(rows: Array) -> Array:
+        sums: Array = np.add.reduceat(rows, starts, axis=-1) / np.sqrt(sizes)
+        return sums
+
+    observed = float(np.sum(averaged(residual) ** 2) / np.sum(residual**2))
+    means = averaged(basis)
+    within = means @ means.T
+    first = count - float(np.trace(within))
+    second = count - 2 * float(np.trace(within)) + float(np.sum(within**2))
+    free = n - len(basis)
+    if first < 1e-6 * count:
+        return 1.0
+    # The share of the rest is small where that of the means is large.
+    return _chance_of_less(1 - observed, free - first, free - 2 * first + second, free, 1.0)
 
 
 def averaged(basis: Array) -> Array:
@@ -103,19 +119,16 @@ def averaged(basis: Array) -> Array:
     return kept
 
 
-def _chance_of_more(residual: Array, basis: Array, more: Array) -> float:
-    """Return the chance that white noise has as much along more directions: an F test.
+def _chance_of_less(observed: float, first: float, second: float, free: int, most: float) -> float:
+    """Return the chance of a smaller ratio, by the traces of M A and its square, and the most."""
+    from scipy.special import betainc
 
-    These are orthonormal rows, (n_more, n_samples), none of which a fit absorbs.
-    """
-    from scipy.special import fdtrc
-
-    left = len(residual) - len(basis) - len(more)
-    if not len(more) or left < 1:
-        return 1.0
-    gained = float(np.sum((more @ residual) ** 2))
-    rest = max(float(residual @ residual) - gained, 1e-300)
-    return float(fdtrc(len(more), left, gained / len(more) * left / rest))
+    mean = first / free
+    variance = 2 * (second - first**2 / free) / (free * (free + 2))
+    share = mean / most
+    weight = share * (1 - share) / (variance / most**2) - 1
+    chance = betainc(share * weight, (1 - share) * weight, min(max(observed / most, 0.0), 1.0))
+    return float(chance)
 
 
 def uneven(residual: Array, basis: Array) -> float:
@@ -375,21 +388,32 @@ def parts_apart(basis: Array, split: int) -> Array:
 
 def compare_halves(residual: Array, basis: Array, split: int) -> float:
     """Return the chance that parts of white noise before and after a reading differ as much."""
-    return _chance_of_more(residual, basis, parts_apart(basis, split))
+    from scipy.special import fdtrc
+
+    more = parts_apart(basis, split)
+    left = len(residual) - len(basis) - len(more)
+    if not len(more) or left < 1:
+        return 1.0
+    gained = float(np.sum((more @ residual) ** 2))
+    rest = max(float(residual @ residual) - gained, 1e-300)
+    return float(fdtrc(len(more), left, gained / len(more) * left / rest))
 
 
 def find_inertia(
     residuals: Residuals, residual: Array, basis: Array, growth: Array | float = 1.0
 ) -> str:
     """Return in words what may make moduli wrong: inertia, if an F test tells it, or what else."""
-    places = residuals.trace.time_s
+    from scipy.special import fdtrc
+
+    places, free = residuals.trace.time_s, len(residual) - len(basis)
     squared = np.where(is_storage(places), places**2, 0.0)
     shape = without(basis, residuals.trace.condensed.cleared(squared) / growth)
-    direction = shape / np.linalg.norm(shape)
-    if _chance_of_more(residual, basis, direction[None]) >= levels.FALSE_ALARM:
+    total, square = float(residual @ residual), float(shape @ shape)
+    size = float(shape @ residual) / square
+    explained = size**2 * square
+    if fdtrc(1, free - 1, explained * (free - 1) / (total - explained)) >= levels.FALSE_ALARM:
         return "a column of something else, slip, too large a strain, or a sample that changed"
-    size = abs(float(shape @ residual)) / float(shape @ shape)
-    part = plain(100 * size * float(places[-1]) ** 2 / float(residuals.trace.readings[-1]), 2)
+    part = plain(100 * abs(size) * float(places[-1]) ** 2 / float(residuals.trace.readings[-1]), 2)
     return (
         "inertia of the instrument or the sample, as the storage modulus has a part that goes with "
         f"the frequency squared, {part} % at the highest: correct for it, or leave the highest "
