@@ -169,7 +169,7 @@ def select(
     Chromosomes are (n_populations, n, n_genes), misfits (n_populations, n). NaN is ranked last. Of
     equals the one with the lowest genes is first.
     """
-    order = np.lexsort([genome.keys(chromosomes), ranking])[:, :count]
+    order = np.lexsort((*genome.keys(chromosomes), ranking))[:, :count]
     return _taken(chromosomes, order), _taken(ranking, order)
 
 

@@ -136,10 +136,14 @@ class Genome:
         parameters /= _OVER.take(powers)
         return parameters
 
-    def keys(self, chromosomes: Chromosomes) -> NDArray[Any]:
-        """Return bytes that order chromosomes, (..., n_genes), by their first unequal gene."""
-        own = np.ascontiguousarray(chromosomes - self.low, dtype=np.uint8)
-        return own.view(f"S{self.genes}")[..., 0]
+    def keys(self, chromosomes: Chromosomes) -> list[Array]:
+        """Return numbers that order chromosomes, (..., n_genes), by their first unequal gene.
+
+        The number of the last genes comes first, as for `numpy.lexsort`. There are several where
+        one, a double, would not be exact.
+        """
+        numbers = (chromosomes - self.low.astype(chromosomes.dtype)) @ self._weights
+        return [numbers[..., column] for column in range(numbers.shape[-1])]
 
     @cached_property
     def _exponents(self) -> IntArray:
@@ -153,6 +157,18 @@ class Genome:
         for parameter, (exponent, size) in enumerate(zip(self._exponents, self.sizes, strict=True)):
             places[exponent + 1 : exponent + size, parameter] = 10.0 ** np.arange(size - 2, -1, -1)
         return places
+
+    @cached_property
+    def _weights(self) -> Array:
+        """Place value of each gene in the numbers of `keys`, (n_genes, n_numbers)."""
+        columns, weight = [np.zeros(self.genes)], 1
+        for gene in range(self.genes)[::-1]:
+            values = int(self.high[gene] - self.low[gene]) + 1
+            if weight * values > 2**53:
+                columns, weight = [*columns, np.zeros(self.genes)], 1
+            columns[-1][gene] = weight
+            weight *= values
+        return np.stack(columns, axis=1)
 
 
 # The largest power of ten that is an exact double.
