@@ -19,11 +19,7 @@ rule gripper_figures:
         "results/benchmarks/gripper_figures.tsv"
     params:
         **settings_of(
-            *("gripper", "actuator", "protocol"),
-            *keys_of_cases(
-                STUDY,
-                *("gripper", *SAMPLE),
-            ),
+            *("gripper", "actuator", "protocol"), *keys_of_cases(STUDY, "gripper", *SAMPLE)
         ),
     message:
         "Drawing the gripper"
@@ -128,10 +124,8 @@ rule readings_of_case:
     resources:
         runtime=120,
     params:
-        **settings_of(
-            # Of the case all, for a reading may change any.
-            *("study_seed", "seeds", "actuator", "readings", *CASE_KEYS),
-        ),
+        # Of the case all, for a reading may change any.
+        **settings_of("study_seed", "seeds", "actuator", "readings", *CASE_KEYS),
     message:
         "Identifying {wildcards.case} under every reading of the paper"
     script:
@@ -148,10 +142,7 @@ rule readings:
     log:
         "results/logs/readings.log",
     params:
-        **settings_of(
-            *("readings", "seeds", "evaluation"),
-            *keys_of_cases(STUDY, *CASE_KEYS),
-        ),
+        **settings_of("readings", "seeds", "evaluation", *keys_of_cases(STUDY, *CASE_KEYS)),
     message:
         "Comparing the readings of the paper"
     script:

@@ -161,7 +161,8 @@ def job_study(job: Any) -> Study:
 
 def job_settings(job: Any) -> dict[str, Any]:
     """Return the keys of the config that a job's rule names, as plain values."""
-    given = {key: value for param in job.params for key, value in param.items()}
+    blocks = [param for param in job.params if isinstance(param, dict)]
+    given = {key: value for block in blocks for key, value in block.items()}
     del given["software"]
     return given
 
