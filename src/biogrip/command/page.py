@@ -3,14 +3,11 @@
 Pictures are Matplotlib's. A page of very many traces has the figure and the table only.
 """
 
-import base64
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import numpy as np
 import yaml
 from matplotlib.figure import Figure
@@ -25,7 +22,7 @@ from biogrip.command.words import (
     set_up_in_words,
     together,
 )
-from biogrip.digits import legible, with_unit
+from biogrip.digits import with_unit
 from biogrip.figures.cells import ONE_COLUMN_IN, draw_cells
 from biogrip.figures.fit import draw_fit, fit_of
 from biogrip.figures.likelihood import draw_profiles_of
@@ -36,9 +33,8 @@ from biogrip.figures.style import (
     PAGE_IN,
     SHADE,
     figure,
-    in_few_colours,
     is_over_decades,
-    save_png,
+    png_of,
     styled,
 )
 from biogrip.files import write_text
@@ -46,10 +42,11 @@ from biogrip.judging.cells import CELL, Told, compare, gather, shared_columns
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.judging.doubts import DOUBTFUL, OK, REJECTED
 from biogrip.judging.without_model import LEVEL, level_turned
+from biogrip.page.page import TEMPLATES, data_url
 from biogrip.physics.protocol import evaluate, hold, join_phases
 from biogrip.physics.simulation import simulated_response
 from biogrip.records.traces import of_recording
-from biogrip.terminal import visible, visible_lines
+from biogrip.terminal import visible_lines
 
 _MARKS = {OK: "✓", DOUBTFUL: "!", REJECTED: "✕"}
 # Most groups of a column that a figure shows, and the word of all traces where there is no such.
@@ -127,9 +124,7 @@ def draw_best(diagnosis: Diagnosis) -> Figure:
 
 
 def _address(drawn: Figure) -> str:
-    png = BytesIO()
-    save_png(drawn, png)
-    return f"data:image/png;base64,{base64.b64encode(in_few_colours(png, 64)).decode()}"
+    return data_url("image/png", png_of(drawn, 64))
 
 
 def draw_traces(outcome: Outcome, columns: Mapping[str, str]) -> tuple[Figure, str]:
@@ -167,7 +162,6 @@ def _told(found: Mapping[str, Any], copied: Mapping[str, str]) -> Told:
 
 def write_page(outcome: Outcome, page: Path) -> None:
     """Write results, with pictures as far as there are any, as HTML."""
-    here = Path(__file__).parent
     traces, copied = outcome.found, outcome.copied
     columns = words.columns_of(traces)
     several = len(traces) != 1 or bool(outcome.refused)
@@ -183,14 +177,7 @@ def write_page(outcome: Outcome, page: Path) -> None:
     assumed: dict[str, dict[str, Any]] = {each["trace"]: each["assumed"] for each in traces}
     shared = common([*assumed.values()])
     own = {trace: _as_yaml(beyond(block, shared)) for trace, block in assumed.items()}
-    environment = jinja2.Environment(
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        loader=jinja2.FileSystemLoader(here),
-    )
-    environment.filters |= {"visible": visible, "legible": legible}
-    text = environment.get_template("page.html.j2").render(
+    text = TEMPLATES.get_template("traces.html.j2").render(
         traces=traces,
         refused={trace: visible_lines(reason) for trace, reason in outcome.refused.items()},
         pictures=outcome.pictures,
@@ -209,7 +196,6 @@ def write_page(outcome: Outcome, page: Path) -> None:
         counts={status: sum(each["fit"] == status for each in traces) for status in _MARKS},
         words=words,
         written_by=f"{WRITTEN_BY} {__version__}",
-        style=(here.parent / "page/report.css").read_text(encoding="utf-8"),
     )
     write_text(page, text)
 
