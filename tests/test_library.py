@@ -10,7 +10,8 @@ import yaml
 
 import biogrip
 from biogrip import library
-from biogrip.command.settings import Asked, Setting, case_of
+from biogrip.command.options import Setting
+from biogrip.command.settings import Asked, case_of
 from tests.helpers.default import STUDY
 from tests.helpers.identified import identified, told
 from tests.helpers.places import EXAMPLE, ROOT

@@ -17,8 +17,9 @@ import yaml
 
 from biogrip.arrays import Array
 from biogrip.cli import _parser, main
+from biogrip.command.options import Setting
 from biogrip.command.outputs import WRITTEN_BY
-from biogrip.command.settings import Asked, Setting, case_of
+from biogrip.command.settings import Asked, case_of
 from biogrip.command.words import for_a_paper, in_columns, noise_in_words
 from biogrip.errors import BiogripError
 from biogrip.judging.doubts import REJECTION
@@ -86,7 +87,7 @@ def test_options_are_keys_of_the_config_and_the_last_one_counts(tmp_path: Path) 
         (same := tmp_path / "same.yaml").write_text(f"measurement: {{{config}}}")
         given = _parser().parse_args(["identify", "a.csv", *options.split(" ")]).settings
         model = Setting("--model", ("sample", "model"), "generalized_maxwell_2")
-        by_options = case_of(Asked(EXAMPLE, None, (model, *(Setting(*each) for each in given))))
+        by_options = case_of(Asked(EXAMPLE, None, (model, *given)))
         assert by_options.block == case_of(Asked(EXAMPLE, same, (model,))).block
         assert by_options.sample.candidate == "generalized_maxwell_2"
 

@@ -11,9 +11,10 @@ import pytest
 
 from biogrip.command import files as command
 from biogrip.command.files import identify_batch
+from biogrip.command.options import Setting
 from biogrip.command.outputs import Outcome
 from biogrip.command.page import beyond, common, draw_traces, write_page
-from biogrip.command.settings import Asked, Setting
+from biogrip.command.settings import Asked
 from biogrip.command.words import columns_of, for_a_paper
 from tests.helpers.identified import write_drop
 from tests.helpers.places import EXAMPLE

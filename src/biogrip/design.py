@@ -155,7 +155,7 @@ class Experiment:
 
 
 def design(
-    config: Path, output: Path | None, within: tuple[str | None, float] | None = None
+    config: Path, output: Path | None = None, within: tuple[str | None, float] | None = None
 ) -> None:
     """Search for a train of steps, print what it tells, and write a config that runs it.
 

@@ -58,7 +58,11 @@ _WIDTH = 100
 
 
 def groups(
-    found: Path, by: str, table: Path | None, unit: str | None = None, plot: Path | None = None
+    found: Path,
+    by: str,
+    table: Path | None = None,
+    unit: str | None = None,
+    plot: Path | None = None,
 ) -> None:
     """Compare groups of cells, print the comparison, write it as CSV and draw it if asked.
 

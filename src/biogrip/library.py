@@ -15,8 +15,9 @@ from threadpoolctl import threadpool_limits
 
 from biogrip.arrays import Array, as_column
 from biogrip.command.files import data_of
+from biogrip.command.options import Setting
 from biogrip.command.outputs import Outcome, table_of
-from biogrip.command.settings import MODEL, Asked, Setting, read_trace
+from biogrip.command.settings import MODEL, Asked, read_trace
 from biogrip.command.words import in_words
 from biogrip.errors import BiogripError
 from biogrip.fit.experiment import Experiment

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from biogrip import __version__
+from biogrip.command.options import Setting
 from biogrip.command.outputs import (
     WRITTEN_BY,
     Outcome,
@@ -28,7 +29,6 @@ from biogrip.command.outputs import (
 )
 from biogrip.command.settings import (
     Asked,
-    Setting,
     check_settings,
     is_table,
     load_in_words,

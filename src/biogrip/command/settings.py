@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.command.options import OPTIONS
+from biogrip.command.options import OPTIONS, Setting
 from biogrip.command.outputs import COLUMNS
 from biogrip.digits import counted, plain
 from biogrip.errors import BiogripError, nearest
@@ -87,18 +87,6 @@ _SEPARATORS = ",;\t"
 _INSTRUMENT = ("gripper", "actuator")
 _OF_RESULTS = re.compile(r".* (verdict|value|low|high)( \(.*\))?")
 _HEAD_BYTES = 100_000
-
-
-@dataclass(frozen=True)
-class Setting:
-    """A key of the config, and the value that an option or a cell of a table gives it."""
-
-    by: str
-    """The option, or line and column of the table, for messages."""
-    path: tuple[str, ...]
-    """The key."""
-    value: Any
-    """Plain value, not yet checked."""
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,8 @@ from typing import Any
 import yaml
 
 from biogrip.command.files import traces_of
-from biogrip.command.settings import Asked, Setting, read_trace, study_of
+from biogrip.command.options import Setting
+from biogrip.command.settings import Asked, read_trace, study_of
 from biogrip.errors import BiogripError
 from biogrip.files import scratch_path, write_text
 from biogrip.identify.prepare import prepare
@@ -25,8 +26,8 @@ from biogrip.traces.columns import trace_file_problem
 
 def write_study(
     files: Sequence[Path],
-    config: Path | None,
-    settings: Sequence[Setting],
+    config: Path | None = None,
+    settings: Sequence[Setting] = (),
     folder: Path | None = None,
 ) -> None:
     """Write the config of a study of traces into a new folder, and print how it is run.
