@@ -198,7 +198,7 @@ def judge_free_arm(results: Results, evidence: str) -> list[Judged]:
     causes = test.step_torque_Nm, test.impulse_Nms
     motion = free_motion(arm, time_s, *causes)
     noise = Noise("gaussian", test.noise_level, "peak")
-    rng = stream(results.study.study_seed, "claims", 0, "calibration")
+    rng = stream(results.study.config.study_seed, "claims", 0, "calibration")
     step, impulse = (add_noise(each, noise, rng) for each in (motion.step, motion.impulse))
     found = calibrate(FreeMotion(time_s, step, impulse), *causes).arm
     errors = [100 * abs(getattr(found, key) / getattr(arm, key) - 1) for key in ARM_KEYS]

@@ -46,7 +46,7 @@ def _reading_rows(case: Case, target: Path) -> Iterator[tuple[str | int, ...]]:
             at, (clean, _) = read.times_s, response(read, read.times_s)
         for seeds in groups(range(case.seeds)):
             noises, searches = (
-                [stream(case.study.study_seed, case.name, seed, purpose) for seed in seeds]
+                [stream(case.study.config.study_seed, case.name, seed, purpose) for seed in seeds]
                 for purpose in ("noise", "genetic")
             )
             traces = [add_noise(clean, read.noise, rng, at) for rng in noises]

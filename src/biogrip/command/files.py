@@ -352,7 +352,7 @@ def _assumed(diagnosis: Diagnosis, case: Case, tried: Sequence[str]) -> dict[str
         "fixed": case.fixed,
         "identifiability": {key: plain(getattr(asked, key)) for key in ("confidence", "at_s")},
         "model_selection": {"models": list(tried)},
-        "study_seed": case.study.study_seed,
+        "study_seed": case.study.config.study_seed,
     }
 
 

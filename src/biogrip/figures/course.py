@@ -162,8 +162,8 @@ def draw_evolution(case: Case, identifications: Path, histories: Path) -> Figure
 def draw_waterfall(case: Case, identifications: Path) -> Figure:
     """Draw sorted increases of chi-squared, of every method's runs and of best encodable points."""
     found = read_identifications(identifications, case)
-    increase = np.maximum(chi_square_increase(found, case.samples), _LOWEST)
-    reached = reached_encodable(found, case.samples, case.study.optimum_tolerance)
+    increase = np.maximum(chi_square_increase(found, len(case.times_s)), _LOWEST)
+    reached = reached_encodable(found, len(case.times_s), case.study.optimum_tolerance)
     drawn = figure(COLUMN_IN, 3.5)
     axes = drawn.subplots()
     methods = found["method"].unique()
@@ -175,7 +175,7 @@ def draw_waterfall(case: Case, identifications: Path) -> Figure:
         place = 100 * (np.arange(len(mine)) + 0.5) / len(mine)
         label = f"{method.title}: {share_in_words(int(reached[runs].sum()), len(mine))}"
         axes.plot(place, mine, label=label, linewidth=width, **line_of(method))
-    least = np.sort(chi_square_increase(found, case.samples, ENCODABLE)[runs]).clip(_LOWEST)
+    least = np.sort(chi_square_increase(found, len(case.times_s), ENCODABLE)[runs]).clip(_LOWEST)
     axes.plot(place, least, "--", color=TARGET, linewidth=0.8, label="best encodable point")
     axes.set(yscale="log", ylim=(_LOWEST / 2, 5 * float(increase.max())))
     ticks = [tick for tick in 10.0 ** np.arange(-3, 7) if tick < axes.get_ylim()[1]]

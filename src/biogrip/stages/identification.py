@@ -76,7 +76,7 @@ def identify(
     records = []
     for group in groups(seeds):
         traces = [recorded.readings[seed] for seed in group]
-        rngs = [stream(case.study.study_seed, case.name, seed, method) for seed in group]
+        rngs = [stream(case.study.config.study_seed, case.name, seed, method) for seed in group]
         problems = experiment.of_each(recorded.time_s, traces)
         answers = identified(problems, rngs, progress.within)
         for seed, trace, answer in zip(group, traces, answers, strict=True):
@@ -145,7 +145,7 @@ def fit(
             case.block.least_squares,
             {
                 name: [
-                    stream(case.study.study_seed, case.name, seed, f"model {name}")
+                    stream(case.study.config.study_seed, case.name, seed, f"model {name}")
                     for seed in group
                 ]
                 for name in models

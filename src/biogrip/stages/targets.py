@@ -92,7 +92,7 @@ def _warn_if_contact_is_lost(case: Case) -> None:
 def measure(case: Case, seeds: Iterable[int], target: Path, measurements: Path) -> None:
     """Add noise of each seed in a batch to a target, CSV, and write the traces, npz."""
     time_s, _, rotation = read_target(target, case.times_s)
-    rngs = {seed: stream(case.study.study_seed, case.name, seed, "noise") for seed in seeds}
+    rngs = {seed: stream(case.study.config.study_seed, case.name, seed, "noise") for seed in seeds}
     traces = {seed: add_noise(rotation, case.noise, rng, time_s) for seed, rng in rngs.items()}
     write_measurements(measurements, Measurements(time_s, rotation, traces))
 
@@ -106,7 +106,7 @@ def calibrate_gripper(case: Case, gripper: Path, records: Path) -> None:
     columns, found = {"time_s": time_s}, {}
     for name in ("left", "right"):
         motion = free_motion(getattr(case.gripper, name), time_s, *causes)
-        rng = stream(case.study.study_seed, case.name, 0, f"calibration {name}")
+        rng = stream(case.study.config.study_seed, case.name, 0, f"calibration {name}")
         record = FreeMotion(
             time_s,
             add_noise(motion.step, noise, rng),

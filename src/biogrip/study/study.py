@@ -100,11 +100,6 @@ class Case:
         return sample_times(self.torque.end_s, self.block.measurement.rate_Hz)
 
     @property
-    def samples(self) -> int:
-        """Number of samples in a simulated trace."""
-        return len(self.times_s)
-
-    @property
     def columns(self) -> Columns:
         """Columns of a recorded trace's file."""
         return self.block.measurement.columns
@@ -225,7 +220,7 @@ class Case:
             self.experiment,
             least_squares=self.block.least_squares,
             confidence=self.confidence,
-            study_seed=self.study.study_seed,
+            study_seed=self.study.config.study_seed,
         )
         if not self.recorded:
             return judged
@@ -328,11 +323,6 @@ class Study:
     def published(self) -> list[str]:
         """Names of cases that the paper reports results of."""
         return self._where(lambda case: case.published.table is not None)
-
-    @property
-    def study_seed(self) -> int:
-        """The seed that all random streams derive from."""
-        return self.config.study_seed
 
     @property
     def near_noise_tolerance(self) -> float:

@@ -38,9 +38,9 @@ def methods(study: Study, identifications: list[Path]) -> ShownTable:
     labels = {}
     for (name, case), path in zip(study.cases.items(), identifications, strict=True):
         found = read_identifications(path, case)
-        found["increase"] = chi_square_increase(found, case.samples)
-        found["least"] = chi_square_increase(found, case.samples, ENCODABLE)
-        found["reached"] = reached_encodable(found, case.samples, study.optimum_tolerance)
+        found["increase"] = chi_square_increase(found, len(case.times_s))
+        found["least"] = chi_square_increase(found, len(case.times_s), ENCODABLE)
+        found["reached"] = reached_encodable(found, len(case.times_s), study.optimum_tolerance)
         for method, mine in found.groupby("method", sort=False):
             share, low, high = share_with_limits(int(mine["reached"].sum()), len(mine))
             row: Row = {
