@@ -388,8 +388,7 @@ def plot(experiment: Experiment, time_s: ArrayLike, readings: ArrayLike, found: 
     from biogrip.figures.style import styled
     from biogrip.records.traces import Measurements
 
-    names = experiment.searched.names
-    values = {**experiment.fixed, **dict(zip(names, map(float, found.parameters), strict=True))}
+    values = dict(zip(experiment.searched.names, map(float, found.parameters), strict=True))
     times, read = as_column(time_s, "time_s"), as_column(readings, "readings")
     fit = fit_of(experiment, values, Measurements(times, None, {0: read}), 0)
     with styled():

@@ -23,20 +23,10 @@ from biogrip.command.words import (
     together,
 )
 from biogrip.digits import with_unit
+from biogrip.figures import style
 from biogrip.figures.cells import ONE_COLUMN_IN, draw_cells
 from biogrip.figures.fit import draw_fit, fit_of
 from biogrip.figures.likelihood import draw_profiles_of
-from biogrip.figures.style import (
-    COLUMN_IN,
-    FITTED,
-    MEASURED,
-    PAGE_IN,
-    SHADE,
-    figure,
-    is_over_decades,
-    png_of,
-    styled,
-)
 from biogrip.files import write_text
 from biogrip.judging.cells import CELL, Told, compare, gather, shared_columns
 from biogrip.judging.diagnosis import Diagnosis
@@ -63,7 +53,7 @@ def draw(diagnosis: Diagnosis, data: Mapping[str, Any]) -> list[str]:
     A third one is of the level over time, as far as that is told without a model.
     """
     drawn = draw_best(diagnosis)
-    with styled():
+    with style.styled():
         more = [draw_level(diagnosis, data)] if data["without_model"]["quantities"] else []
         return [_address(each) for each in (drawn, draw_profiles_of(data), *more)]
 
@@ -83,16 +73,16 @@ def draw_level(diagnosis: Diagnosis, data: Mapping[str, Any]) -> Figure:
     network = experiment.searched.network(np.exp(diagnosis.likelihood.best))
     best = simulated_response(experiment.gripper, network, step, times, nonlinear=False)[0]
     turned = level_turned(diagnosis.likelihood.problem.residuals) or (lambda response: response)
-    drawn = figure(COLUMN_IN, 2.4)
+    drawn = style.figure(style.COLUMN_IN, 2.4)
     axes = drawn.subplots()
     low, high = np.array([(it.low, it.high) for it in told], dtype=float).T
-    axes.fill_between(times, low, high, color=SHADE, label="any linear sample")
-    axes.plot(times, turned(best), "--", color=FITTED, label="best fit")
+    axes.fill_between(times, low, high, color=style.SHADE, label="any linear sample")
+    axes.plot(times, turned(best), "--", color=style.FITTED, label="best fit")
     after = recording.time_s > 0
     held = evaluate(experiment.torque, recording.time_s[after])
     if not (experiment.instrument.sweeps or np.ptp(held) or experiment.offset_and_drift):
         readings = turned(recording.readings[after] / held)
-        axes.plot(recording.time_s[after], readings, ".", color=MEASURED, markersize=1.2)
+        axes.plot(recording.time_s[after], readings, ".", color=style.MEASURED, markersize=1.2)
     ends = float(np.nanmin(low)), float(np.nanmax(high))
     axes.set_ylim(ends[0] - 0.1 * np.ptp(ends), ends[1] + 0.1 * np.ptp(ends))
     axes.set(xscale="log", xlabel="time after a step (s)", xlim=times[[0, -1]])
@@ -110,13 +100,12 @@ def draw_best(diagnosis: Diagnosis) -> Figure:
     assert experiment is not None
     assert recording is not None
     found = {finding.quantity.label: finding.value for finding in diagnosis.findings}
-    values = {name: found[name] for name in experiment.searched.names}
-    fit = fit_of(experiment, {**experiment.fixed, **values}, of_recording(recording), 0)
+    fit = fit_of(experiment, found, of_recording(recording), 0)
     start_s = recording.onset_s or 0.0
-    spread = is_over_decades(fit.time_s)
+    spread = style.is_over_decades(fit.time_s)
     if not spread:
         fit = replace(fit, time_s=fit.time_s + start_s)
-    with styled():
+    with style.styled():
         drawn = draw_fit({"best fit": fit}, "")
         if spread and start_s:
             drawn.axes[-1].set_xlabel(f"time since {start_s:.6g} s of the clock (s)")
@@ -124,7 +113,7 @@ def draw_best(diagnosis: Diagnosis) -> Figure:
 
 
 def _address(drawn: Figure) -> str:
-    return data_url("image/png", png_of(drawn, 64))
+    return data_url("image/png", style.png_of(drawn, 64))
 
 
 def draw_traces(outcome: Outcome, columns: Mapping[str, str]) -> tuple[Figure, str]:
@@ -149,7 +138,7 @@ def draw_traces(outcome: Outcome, columns: Mapping[str, str]) -> tuple[Figure, s
     said = f"Groups: {by}. " if by != _ALL else ""
     said += f"Large marks: means of each {unit}." if unit else "Cells are taken for independent."
     # A panel each side by side, as many as a screen has room for.
-    width_in = max(PAGE_IN, ONE_COLUMN_IN / 2 * min(len(columns), _MOST_PANELS))
+    width_in = max(style.PAGE_IN, ONE_COLUMN_IN / 2 * min(len(columns), _MOST_PANELS))
     return draw_cells(cells, compared, {name: units[name] for name in columns}, width_in), said
 
 
@@ -167,7 +156,7 @@ def write_page(outcome: Outcome, page: Path) -> None:
     several = len(traces) != 1 or bool(outcome.refused)
     figure_of_all = groups = ""
     if several and traces:
-        with styled():
+        with style.styled():
             drawn, groups = draw_traces(outcome, columns)
             figure_of_all = _address(drawn)
     outcomes = [(it["trace"], it["fit"], " ".join(it["reasons"])) for it in traces]

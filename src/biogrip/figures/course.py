@@ -14,20 +14,8 @@ from matplotlib.ticker import LogLocator, MaxNLocator
 
 from biogrip.arrays import Array
 from biogrip.digits import with_unit
+from biogrip.figures import style
 from biogrip.figures.fit import SHOWN_SEEDS, first_of_basins, read_history, seeds_in_words
-from biogrip.figures.style import (
-    ALL_SEEDS,
-    COLUMN_IN,
-    PAPER,
-    RUNS,
-    SHADE,
-    TARGET,
-    figure,
-    line_of,
-    panel,
-    points_within,
-    row_of_panels,
-)
 from biogrip.judging.likelihood import bound
 from biogrip.judging.quantities import Quantity, parameters_and_sum
 from biogrip.judging.verdicts import DETERMINED
@@ -52,15 +40,15 @@ _LOWEST = 1e-3
 
 def _line_of_seed(seed: object, shown: Sequence[int], alpha: float) -> dict[str, Any]:
     if seed in shown:
-        return {"color": RUNS[shown.index(seed)], "linewidth": 1.5, "zorder": 3}
-    return {"color": ALL_SEEDS, "linewidth": 0.4, "alpha": alpha}
+        return {"color": style.RUNS[shown.index(seed)], "linewidth": 1.5, "zorder": 3}
+    return {"color": style.ALL_SEEDS, "linewidth": 0.4, "alpha": alpha}
 
 
 def _name_seeds(axes: Axes, seeds: int, first: Iterable[str]) -> None:
     """Add to the legend what the lines of seeds are."""
     if seeds > 1:
-        axes.plot([], [], color=ALL_SEEDS, linewidth=0.8, label=seeds_in_words(seeds))
-    for words, color in zip(first, RUNS, strict=False):
+        axes.plot([], [], color=style.ALL_SEEDS, linewidth=0.8, label=seeds_in_words(seeds))
+    for words, color in zip(first, style.RUNS, strict=False):
         axes.plot([], [], color=color, label=words)
 
 
@@ -74,14 +62,14 @@ def draw_convergence(case: Case, identifications: Path, histories: Path) -> Figu
     first = first_of_basins(found, tolerance)
     shown = [int(run["seed"]) for run in first.values()]
     history = read_history(histories, method.name, shown)
-    drawn = figure(COLUMN_IN, 2.9)
+    drawn = style.figure(style.COLUMN_IN, 2.9)
     axes = drawn.subplots()
     for seed, rows in history.groupby("seed"):
         excess = 100 * (rows["best_misfit"] / unit[seed] - 1)
         axes.plot(rows["generation"], excess, **_line_of_seed(seed, shown, 0.7))
     _name_seeds(axes, len(found), first)
     label = "noise in the trace" if noisy else "lowest misfit"
-    axes.axhline(0, color=TARGET, linestyle="--", linewidth=0.8, label=label)
+    axes.axhline(0, color=style.TARGET, linestyle="--", linewidth=0.8, label=label)
     last = int(history["generation"].max())
     if "genetic_algorithm" in method.blocks:
         mutation_start = case.block.genetic_algorithm.mutation_start
@@ -96,7 +84,7 @@ def draw_convergence(case: Case, identifications: Path, histories: Path) -> Figu
     axes.set_ylabel(f"best misfit above {'noise' if noisy else 'the lowest'} (%)")
     if noisy:
         words, near = near_noise_words(tolerance), 100 * tolerance
-        axes.axhline(near, color=TARGET, linestyle="-.", linewidth=0.8, label=words)
+        axes.axhline(near, color=style.TARGET, linestyle="-.", linewidth=0.8, label=words)
         reached = near_noise(found, tolerance).sum()
         axes.set_title(f"{case.title}: {reached} of {len(found)} {words}")
     drawn.legend(loc="outside lower center", ncols=2)
@@ -105,7 +93,7 @@ def draw_convergence(case: Case, identifications: Path, histories: Path) -> Figu
 
 def _mark_mutation(axes: Axes, start: int, last: int) -> None:
     """Mark the generation in which mutation starts, with a label below the curves."""
-    axes.axvline(start, color=TARGET, linestyle=":", linewidth=0.8)
+    axes.axvline(start, color=style.TARGET, linestyle=":", linewidth=0.8)
     before = start > last / 2
     axes.annotate(
         "mutation starts",
@@ -128,17 +116,17 @@ def draw_evolution(case: Case, identifications: Path, histories: Path) -> Figure
     parameters, identified = case.sample.model.parameters, case.published.identified
     columns = [parameter.column for parameter in parameters]
     history = read_history(histories, method.name, shown, columns)
-    drawn = figure(COLUMN_IN, 1.2 + 1.5 * (rows := -(-len(parameters) // 2)))
+    drawn = style.figure(style.COLUMN_IN, 1.2 + 1.5 * (rows := -(-len(parameters) // 2)))
     grid = drawn.subplots(rows, 2, sharex=True).ravel()
     for axes, parameter in zip(grid, parameters, strict=False):
         for seed, rows in history.groupby("seed"):
-            style = _line_of_seed(seed, shown, 0.6)
-            axes.step(rows["generation"], rows[parameter.column], where="post", **style)
+            look = _line_of_seed(seed, shown, 0.6)
+            axes.step(rows["generation"], rows[parameter.column], where="post", **look)
         target = case.parameters.get(parameter.name, 0)
         if target > 0:
-            axes.axhline(target, color=TARGET, linestyle="--")
+            axes.axhline(target, color=style.TARGET, linestyle="--")
         if parameter.name in identified:
-            axes.axhline(identified[parameter.name], color=PAPER, linestyle=":")
+            axes.axhline(identified[parameter.name], color=style.PAPER, linestyle=":")
         if np.any(history[parameter.column] > 0):
             axes.set_yscale("log")
         axes.set_ylabel(with_unit(parameter.symbol, parameter.unit))
@@ -150,9 +138,9 @@ def draw_evolution(case: Case, identifications: Path, histories: Path) -> Figure
         axes.tick_params(labelbottom=True)
     _name_seeds(grid[0], len(found), first)
     if case.parameters:
-        grid[0].plot([], [], color=TARGET, linestyle="--", label="target")
+        grid[0].plot([], [], color=style.TARGET, linestyle="--", label="target")
     if identified:
-        grid[0].plot([], [], color=PAPER, linestyle=":", label="identified in the paper")
+        grid[0].plot([], [], color=style.PAPER, linestyle=":", label="identified in the paper")
     handles, labels = grid[0].get_legend_handles_labels()
     drawn.legend(handles, labels, loc="outside lower center", ncols=2)
     drawn.suptitle(case.title, x=0.01, ha="left", fontsize=8)
@@ -164,7 +152,7 @@ def draw_waterfall(case: Case, identifications: Path) -> Figure:
     found = read_identifications(identifications, case)
     increase = np.maximum(chi_square_increase(found, len(case.times_s)), _LOWEST)
     reached = reached_encodable(found, len(case.times_s), case.study.optimum_tolerance)
-    drawn = figure(COLUMN_IN, 3.5)
+    drawn = style.figure(style.COLUMN_IN, 3.5)
     axes = drawn.subplots()
     methods = found["method"].unique()
     # Where curves coincide each is seen beside the thinner ones on top of it.
@@ -174,9 +162,9 @@ def draw_waterfall(case: Case, identifications: Path) -> Figure:
         mine = np.sort(increase[runs])
         place = 100 * (np.arange(len(mine)) + 0.5) / len(mine)
         label = f"{method.title}: {share_in_words(int(reached[runs].sum()), len(mine))}"
-        axes.plot(place, mine, label=label, linewidth=width, **line_of(method))
+        axes.plot(place, mine, label=label, linewidth=width, **style.line_of(method))
     least = np.sort(chi_square_increase(found, len(case.times_s), ENCODABLE)[runs]).clip(_LOWEST)
-    axes.plot(place, least, "--", color=TARGET, linewidth=0.8, label="best encodable point")
+    axes.plot(place, least, "--", color=style.TARGET, linewidth=0.8, label="best encodable point")
     axes.set(yscale="log", ylim=(_LOWEST / 2, 5 * float(increase.max())))
     ticks = [tick for tick in 10.0 ** np.arange(-3, 7) if tick < axes.get_ylim()[1]]
     axes.set_yticks(ticks, [f"≤{_LOWEST:g}", *(f"{tick:g}" for tick in ticks[1:])])
@@ -210,7 +198,7 @@ def draw_scatter(
     _, sensitivity = experiment.of(time_s, rotation).residuals(log_truth)
     noise_sd = standard_deviation(rotation, case.noise)
     quantities = parameters_and_sum(experiment.searched)
-    drawn, grid = row_of_panels(len(quantities), 3.1)
+    drawn, grid = style.row_of_panels(len(quantities), 3.1)
     for index, (axes, quantity) in enumerate(zip(grid, quantities, strict=True)):
         names = [experiment.searched.parameters[i] for i in quantity.members]
         value = sum(case.parameters[p.name] for p in names)
@@ -225,7 +213,7 @@ def draw_scatter(
         known = limit if limit and verdict == DETERMINED else np.inf
         _quantity(axes, case, found["method"], ratios.to_numpy(float), known)
         _paper(axes, case.published.identified, [p.name for p in names], value)
-        panel(axes, "abcdefghijklmnopqrstuvwxyz"[index], _title(quantity, known, verdict), 60)
+        style.panel(axes, "abcdefghijklmnopqrstuvwxyz"[index], _title(quantity, known, verdict), 60)
         if index == 0:
             axes.set_ylabel("identified / target")
     _legend(drawn, case, list(found["method"].unique()), found["seed"].nunique())
@@ -248,18 +236,18 @@ def _quantity(
         shown = mine[:SHOWN_SEEDS]
         # A fixed sideways scatter keeps points apart.
         x = place + 0.6 * ((np.arange(len(shown)) * 0.618034) % 1 - 0.5)
-        style = _DOTS | {"color": line_of(case.study.identifiers[name])["color"]}
+        look = _DOTS | {"color": style.line_of(case.study.identifiers[name])["color"]}
         points, ends = np.column_stack([x, shown]), ((-np.inf, bottom), (np.inf, top))
-        points_within(axes, points, *ends, style, edge_size=3)
+        style.points_within(axes, points, *ends, look, edge_size=3)
         low, middle, high = np.clip(quartiles[place], bottom, top)
-        axes.plot([place, place], [low, high], color=TARGET, linewidth=1.0)
-        axes.plot([place - 0.3, place + 0.3], [middle, middle], color=TARGET, linewidth=1.4)
+        axes.plot([place, place], [low, high], color=style.TARGET, linewidth=1.0)
+        axes.plot([place - 0.3, place + 0.3], [middle, middle], color=style.TARGET, linewidth=1.4)
     if np.isfinite(limit):
         half = NormalDist().inv_cdf((1 + case.confidence) / 2) * limit
         # Of the logarithm, straight where the axis is.
         low, high = (np.exp(-half), np.exp(half)) if loose else (1 - half, 1 + half)
-        axes.axhspan(low, high, color=SHADE, zorder=0, linewidth=0)
-    axes.axhline(1, color=TARGET, linewidth=0.6)
+        axes.axhspan(low, high, color=style.SHADE, zorder=0, linewidth=0)
+    axes.axhline(1, color=style.TARGET, linewidth=0.6)
     if loose:
         axes.set_yscale("log")
         axes.yaxis.set_major_locator(LogLocator(numticks=5))
@@ -274,7 +262,7 @@ def _paper(axes: Axes, identified: Mapping[str, float], names: list[str], target
     if all(name in identified for name in names):
         low, high = axes.get_ylim()
         value = float(np.clip(sum(identified[name] for name in names) / target, low, high))
-        axes.axhline(value, color=PAPER, linewidth=1.2, linestyle=(0, (4, 2)))
+        axes.axhline(value, color=style.PAPER, linewidth=1.2, linestyle=(0, (4, 2)))
 
 
 def _title(quantity: Quantity, limit: float, verdict: str) -> str:
@@ -287,13 +275,13 @@ def _legend(drawn: Figure, case: Case, methods: list[str], seeds: int) -> None:
     marks = [(case.study.identifiers[name].title, "o", name) for name in methods]
     handles: list[Any] = []
     for label, marker, name in [*marks, ("beyond the axis", "^", "")]:
-        color = line_of(case.study.identifiers[name])["color"] if name else TARGET
-        style: dict[str, Any] = {"color": color, "markersize": 4, "markeredgewidth": 0}
-        handles += axes.plot([], [], marker, label=label, **style)
+        color = style.line_of(case.study.identifiers[name])["color"] if name else style.TARGET
+        look: dict[str, Any] = {"color": color, "markersize": 4, "markeredgewidth": 0}
+        handles += axes.plot([], [], marker, label=label, **look)
     label = f"{100 * case.confidence:g} % by the Cramér-Rao bound (named above), rest known"
-    handles.append(axes.fill([], [], color=SHADE, label=label)[0])
+    handles.append(axes.fill([], [], color=style.SHADE, label=label)[0])
     if case.published.identified:
-        handles += axes.plot([], [], color=PAPER, linestyle=(0, (4, 2)), label="paper")
+        handles += axes.plot([], [], color=style.PAPER, linestyle=(0, (4, 2)), label="paper")
     drawn.legend(handles=handles, loc="outside lower left", ncols=3)
     few = "" if seeds <= SHOWN_SEEDS else f": {seeds_in_words(seeds)}, quartiles of all"
     drawn.suptitle(case.title + few, x=0.01, ha="left", fontsize=8)
