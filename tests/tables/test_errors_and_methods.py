@@ -80,7 +80,7 @@ def test_joined_errors_are_within_the_tolerance_their_heading_names(eleven_seeds
 def study(parameters: dict[str, float], samples: int, *methods: str, seeds: int = 1) -> Any:
     known = {"sample": Sample("generalized_maxwell"), "parameters": parameters, "seeds": seeds}
     own, near = seen(config=seen(methods=methods)), {"near_noise_tolerance": 0.02}
-    drop = seen(name="drop", samples=samples, study=own, **known)
+    drop = seen(name="drop", times_s=range(samples), study=own, **known)
     return seen(cases={"drop": drop}, identifiers=METHODS, optimum_tolerance=1.0, **near)
 
 

@@ -14,13 +14,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 import yaml
+from scipy.stats import binom
 
+from biogrip.arrays import Array
 from biogrip.judging.verdicts import DETERMINED
 from biogrip.physics.calibration import ARM_KEYS, FreeMotion, calibrate, free_motion
 from biogrip.physics.noise import Noise, add_noise, stream
 from biogrip.physics.protocol import sample_times
 from biogrip.records.identifications import (
-    median_with_limits,
     near_noise,
     read_histories,
     read_identifications,
@@ -93,6 +94,13 @@ def in_words(hits: int, runs: int) -> str:
     """Return a share in words, with its 95 % limits."""
     share, low, high = (100 * end for end in share_with_limits(hits, runs))
     return f"{share:.0f} % ({low:.0f} to {high:.0f} %) of {runs}"
+
+
+def median_with_limits(values: Array) -> tuple[float, float, float]:
+    """Return the median of values, (n,), and its 95 % interval from their order."""
+    ordered, count = np.sort(values), len(values)
+    first = max(int(binom.ppf(0.025, count, 0.5)) - 1, 0)
+    return float(np.median(values)), float(ordered[first]), float(ordered[count - 1 - first])
 
 
 class Evidence(Formatter):

@@ -100,20 +100,23 @@ def seeds_of(batch: str) -> range:
     return range(int(found[1]), int(found[2]) + 1)
 
 
-def whole(path: Path, what: str = "a table") -> str:
-    """Return the text of a CSV file, whose last line must have an end, and each row all cells."""
+def whole(path: Path, what: str = "a table", again: str = f" {AGAIN}") -> str:
+    """Return the text of a CSV file, in which each row must have all cells.
+
+    The last line must have an end, too, if the same command makes the file again.
+    """
     try:
-        with path.open(encoding="utf-8", newline="") as stream:
-            text = stream.read()
+        with path.open(encoding="utf-8-sig", newline="") as stream:
+            text = stream.read() if again else stream.read().rstrip("\r\n") + "\n"
         if "\0" in text:
             raise ValueError("found a byte of 0")
         widths = [len(row) for row in csv.reader(StringIO(text, newline=""), strict=True)]
     except (OSError, ValueError, csv.Error) as error:
-        raise BiogripError(f"{path}: cannot be read as {what}: {error}. {AGAIN}") from error
+        raise BiogripError(f"{path}: cannot be read as {what}: {error}.{again}") from error
     short = [line for line, width in enumerate(widths, start=1) if width != widths[0]]
     if short or not text.endswith("\n"):
         line = short[0] if short else len(widths)
-        raise BiogripError(f"{path}, line {line}: part of the line is missing. {AGAIN}")
+        raise BiogripError(f"{path}, line {line}: part of the line is missing.{again}")
     return text
 
 
@@ -157,16 +160,12 @@ def read_frame(
 
 
 def read_rows(path: Path, columns: Sequence[str] | None = None) -> list[list[str]]:
-    """Read the header, which may have to be given columns, and all rows as text."""
-    import pandas as pd
+    """Read the header, which may have to be given columns, and all rows as text.
 
-    if columns is not None:
-        whole(path)
-    try:
-        frame = pd.read_csv(path, header=None, dtype=str, na_filter=False)
-    except (OSError, ValueError) as error:
-        raise BiogripError(f"{path}: cannot be read: {str(error).strip()}.") from error
-    rows: list[list[str]] = frame.map(as_it_was).to_numpy().tolist()
+    Without columns the file is a user's, see `whole`.
+    """
+    text = whole(path, again="" if columns is None else f" {AGAIN}")
+    rows = [[*map(as_it_was, row)] for row in csv.reader(StringIO(text, newline=""))]
     if columns is not None and rows[0] != list(columns):
         found, wanted = ",".join(rows[0]), ",".join(columns)
         raise BiogripError(f"{path}, line 1: found {found}; wanted {wanted}.")
