@@ -146,7 +146,7 @@ GROUPS: dict[str, list[tuple[str, str, Key, str]]] = {
         (
             *("--set", "KEY=VALUE", _any_key),
             "as in measurement.time_unit=ms or measurement.block=2, YAML; repeatable",
-        ),
+        )
     ],
 }
 """Options by what they are about: name; what is given, nothing for a switch; key; help."""

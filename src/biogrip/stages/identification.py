@@ -123,11 +123,7 @@ def join(
 
 
 def fit(
-    case: Case,
-    seeds: Sequence[int],
-    measurements: Path,
-    calibrated: list[Path],
-    fits: Path,
+    case: Case, seeds: Sequence[int], measurements: Path, calibrated: list[Path], fits: Path
 ) -> None:
     """Fit a batch of seeds by least squares with each model."""
     models = {name: sample.model for name, sample in case.models.items()}

@@ -125,9 +125,7 @@ def _judged(
 
 
 def judge_quantities(
-    fits: Sequence[TraceFit],
-    quantities: Sequence[Quantity],
-    confidence: float,
+    fits: Sequence[TraceFit], quantities: Sequence[Quantity], confidence: float
 ) -> list[Diagnosis]:
     """Judge quantities of traces as users are shown them, but for notes and combinations."""
 

@@ -108,9 +108,7 @@ def calibrate_gripper(case: Case, gripper: Path, records: Path) -> None:
         motion = free_motion(getattr(case.gripper, name), time_s, *causes)
         rng = stream(case.study.config.study_seed, case.name, 0, f"calibration {name}")
         record = FreeMotion(
-            time_s,
-            add_noise(motion.step, noise, rng),
-            add_noise(motion.impulse, noise, rng),
+            time_s, add_noise(motion.step, noise, rng), add_noise(motion.impulse, noise, rng)
         )
         columns |= {f"{name}_step_rad": record.step, f"{name}_impulse_rad": record.impulse}
         found[name] = calibrate(record, *causes)

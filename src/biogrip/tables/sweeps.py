@@ -37,11 +37,7 @@ _FACTOR, _BOUNDS = math.log(2), 4.0
 
 
 def judge(
-    study: Study,
-    sweep: str,
-    identifications: list[Path],
-    calibrated: list[Path],
-    points: Path,
+    study: Study, sweep: str, identifications: list[Path], calibrated: list[Path], points: Path
 ) -> None:
     """Compute errors and shares of successful seeds at every point of a sweep.
 

@@ -15,14 +15,7 @@ from biogrip.errors import BiogripError, nearest
 from biogrip.physics.instruments import INSTRUMENTS, PHASE
 from biogrip.physics.protocol import joined
 from biogrip.terminal import visible
-from biogrip.traces.columns import (
-    AXES,
-    Columns,
-    listed,
-    place,
-    shortened,
-    unit_of,
-)
+from biogrip.traces.columns import AXES, Columns, listed, place, shortened, unit_of
 from biogrip.traces.tables import (
     BLANKS,
     DAY_S,
