@@ -281,11 +281,10 @@ def set_up(
     duration_s = block.duration_s or min(case.experiment.torque.end_s for case in cases)
     intervals = int(duration_s * rate_Hz * (1 + 1e-12))
     if not _FEWEST <= intervals <= _MOST:
-        text = f"design.duration_s: found {duration_s:g} s, room for {intervals} readings at "
-        text += (
-            f"{rate_Hz:g} Hz; allowed are {_FEWEST} to {_MOST}, by another duration_s or rate_Hz"
+        raise BiogripError(
+            f"design.duration_s: found {duration_s:g} s, room for {intervals} readings at "
+            f"{rate_Hz:g} Hz; allowed are {_FEWEST} to {_MOST}, by another duration_s or rate_Hz."
         )
-        raise BiogripError(f"{text}.")
     limits = Limits(min(block.steps, intervals // _FEWEST), largest, rate_Hz, intervals)
     return limits, [_specimen(case, block, limits) for case in cases]
 
@@ -444,7 +443,8 @@ def _said(
         name, instrument = one.case.name, one.case.instrument
         controlled, read = instrument.controlled, instrument.read
         for index, parameter in enumerate(one.case.experiment.searched.names):
-            percents = (_percent(each.bounds[index]) for each in both)
+            bounds = (each.bounds[index] for each in both)
+            percents = (f"{100 * it:.3g}" if it < NO_BOUND else "none" for it in bounds)
             rows.append((name, f"{parameter}: bound (%)", *percents))
             if one.required[index] and not within[index]:
                 notes.append(f"No protocol that was tried determines {parameter} of {name}.")
@@ -465,10 +465,6 @@ def _said(
         "A bound is the least standard deviation (Cramér-Rao) in percent of the value, with all "
         "parameters unknown that are not fixed. The noise is white, and the same under both."
     )
-
-
-def _percent(bound: float) -> str:
-    return f"{100 * bound:.3g}" if bound < NO_BOUND else "none"
 
 
 def _rounded(value: float) -> float:

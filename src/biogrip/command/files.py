@@ -24,8 +24,8 @@ from biogrip.command.outputs import (
     as_written,
     check_output,
     read_result,
+    table_of,
     write_result,
-    write_table,
 )
 from biogrip.command.settings import (
     Asked,
@@ -46,6 +46,7 @@ from biogrip.identify.other_fits import Trace
 from biogrip.identify.prepare import prepare
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.keys import plain
+from biogrip.records.rows import write_rows
 from biogrip.study.source import default_config
 from biogrip.study.study import Case
 from biogrip.terminal import Progress, visible
@@ -114,7 +115,7 @@ def identify_files(
     copied = {own.name: own.copied for own in asked}
     outcome = replace(outcome, refused=outcome.refused | absent, copied=copied)
     if table is not None:
-        write_table(outcome, table)
+        write_rows(table, *table_of(outcome))
     if report is not None:
         from biogrip.command.page import write_page
 

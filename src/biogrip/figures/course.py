@@ -141,8 +141,7 @@ def draw_evolution(case: Case, identifications: Path, histories: Path) -> Figure
         grid[0].plot([], [], color=style.TARGET, linestyle="--", label="target")
     if identified:
         grid[0].plot([], [], color=style.PAPER, linestyle=":", label="identified in the paper")
-    handles, labels = grid[0].get_legend_handles_labels()
-    drawn.legend(handles, labels, loc="outside lower center", ncols=2)
+    drawn.legend(*grid[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     drawn.suptitle(case.title, x=0.01, ha="left", fontsize=8)
     return drawn
 

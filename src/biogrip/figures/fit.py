@@ -12,7 +12,6 @@ from matplotlib.figure import Figure
 
 from biogrip.arrays import Array
 from biogrip.digits import with_unit
-from biogrip.errors import BiogripError
 from biogrip.figures import style
 from biogrip.fit.experiment import Experiment
 from biogrip.physics.instruments import INSTRUMENTS, ROTATION, Channel
@@ -73,7 +72,8 @@ def fits_of_basins(
     for words, run in first_of_basins(found, case.study.near_noise_tolerance).items():
         seed = int(run["seed"])
         values = {p.name: float(run[p.column]) for p in case.sample.model.parameters}
-        recorded = read_measurements(_holding(seed, measurements), [seed])
+        holding = next(path for path in measurements if seed in seeds_of(path.stem))
+        recorded = read_measurements(holding, [seed])
         experiment = experiment_for(case.experiment, recorded, calibrated)
         fits[f"fit ({words})"] = fit_of(experiment, values, recorded, seed)
     return fits
@@ -130,13 +130,6 @@ def scale_of_fit(fit: Fit) -> tuple[float, str]:
     """Return factor and unit with a prefix, where the unit of the readings may have one."""
     plain = fit.read.unit.isalpha()
     return scale_of(fit.fitted, fit.read.unit) if plain else (1.0, fit.read.unit)
-
-
-def _holding(seed: int, measurements: list[Path]) -> Path:
-    for path in measurements:
-        if seed in seeds_of(path.stem):
-            return path
-    raise BiogripError(f"no measurement file holds seed {seed}.")
 
 
 _READINGS: dict[str, Any] = {"linestyle": "", "marker": ".", "markersize": 1.2, "rasterized": True}

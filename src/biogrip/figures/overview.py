@@ -1,6 +1,5 @@
 """Figures of a study: fits and identifications about the truth, moduli, its answer at a glance."""
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,6 @@ from biogrip.digits import with_unit
 from biogrip.figures import style
 from biogrip.figures.fit import (
     SHOWN_SEEDS,
-    Fit,
     draw_traces,
     first_seeds,
     fits_of_basins,
@@ -61,7 +59,12 @@ def draw_overview(
     drawn = style.figure(style.PAGE_IN, 3.0)
     axes = drawn.subplots(1, 1 + len(cases), width_ratios=[2] + [1.05] * len(cases))
     fits = fits_of_basins(cases[0], identifications[0], measurements, calibrated)
-    _fits(axes[0], cases[0], fits)
+    factor, _ = draw_traces(axes[0], fits)
+    fit = next(iter(fits.values()))
+    axes[0].set_ylim(top=1.65 * factor * fit.measured.max())
+    axes[0].set(xlim=(fit.time_s[0], fit.time_s[-1]), xlabel="time (s)")
+    axes[0].legend(loc="upper right")
+    style.panel(axes[0], "a", cases[0].title)
     files = zip(axes[1:], cases, identifications, expected, strict=True)
     for index, (scatter, case, path, judged) in enumerate(files):
         found = read_identifications(path, case, study.shown)
@@ -71,10 +74,8 @@ def draw_overview(
         scatter.set_yticks([1e-3, 1e-2, 0.1, 1, 10, 100, 1e3], [""] * 7 if index else None)
         style.panel(scatter, "bcd"[index], case.title, most_letters=_TITLE_LETTERS)
     axes[1].set_ylabel("identified / target")
-    legend: dict[str, Any] = {}
-    for scatter in axes[1:]:
-        handles, labels = scatter.get_legend_handles_labels()
-        legend |= dict(zip(labels, handles, strict=True))
+    pairs = (zip(*it.get_legend_handles_labels(), strict=True) for it in axes[1:])
+    legend = {label: handle for pair in pairs for handle, label in pair}
     drawn.legend(
         legend.values(),
         legend.keys(),
@@ -84,15 +85,6 @@ def draw_overview(
         title=seeds_in_words(len(found)) if len(found) > SHOWN_SEEDS else None,
     )
     return drawn
-
-
-def _fits(axes: Axes, case: Case, fits: Mapping[str, Fit]) -> None:
-    factor, _ = draw_traces(axes, fits)
-    fit = next(iter(fits.values()))
-    axes.set_ylim(top=1.65 * factor * fit.measured.max())
-    axes.set(xlim=(fit.time_s[0], fit.time_s[-1]), xlabel="time (s)")
-    axes.legend(loc="upper right")
-    style.panel(axes, "a", case.title)
 
 
 def _scatter(

@@ -39,33 +39,29 @@ def simulate(case: Case, target: Path) -> None:
     A response that is not finite, or turns the arms beyond the combs' stroke, is an error.
     """
     time_s = case.times_s
-    controlled = evaluate(case.torque, time_s)
-    if not case.instrument.has_jaws:
-        device = case.gripper, case.network, case.torque
-        read = simulated_response(*device, time_s, nonlinear=False)[0]
-        _check_finite(case, time_s, read)
-        write_target(target, case.instrument, time_s, controlled, read)
-        return
-    rotation, force = response(case, time_s)
-    _check_finite(case, time_s, rotation)
-    largest = float(np.max(np.abs(rotation)))
-    if largest > case.stroke:
-        raise BiogripError(
-            f"the protocol turns the arms by {1e3 * largest:.4g} mrad, allowed is what the comb "
-            f"drive's stroke leaves, {1e3 * case.stroke:.4g} mrad."
-        )
-    _warn_if_contact_is_lost(case)
-    write_target(target, case.instrument, time_s, controlled, rotation, force)
+    read, force = response(case, time_s)
+    _check_finite(case, time_s, read)
+    if case.instrument.has_jaws:
+        largest = float(np.max(np.abs(read)))
+        if largest > case.stroke:
+            raise BiogripError(
+                f"the protocol turns the arms by {1e3 * largest:.4g} mrad, allowed is what the "
+                f"comb drive's stroke leaves, {1e3 * case.stroke:.4g} mrad."
+            )
+        _warn_if_contact_is_lost(case)
+    write_target(target, case.instrument, time_s, evaluate(case.torque, time_s), read, force)
 
 
-def response(case: Case, time_s: Array) -> tuple[Array, Array]:
-    """Return the rotation of the left arm and the jaw force, (n_samples,) each."""
+def response(case: Case, time_s: Array) -> tuple[Array, Array | None]:
+    """Return what is read and, if there are jaws, their force, (n_samples,) each."""
     device, nonlinear = (case.gripper, case.network, case.torque), case.nonlinear_target
     if case.unilateral:
         found = unilateral_response(*device, time_s)
         return found.rotation[0], found.jaw_force_N
-    rotation = simulated_response(*device, time_s, nonlinear=nonlinear)
-    return rotation[0], jaw_force(*device, time_s, nonlinear=nonlinear)[0]
+    read = simulated_response(*device, time_s, nonlinear=nonlinear)[0]
+    if not case.instrument.has_jaws:
+        return read, None
+    return read, jaw_force(*device, time_s, nonlinear=nonlinear)[0]
 
 
 def _check_finite(case: Case, time_s: Array, simulated: Array) -> None:

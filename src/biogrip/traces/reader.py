@@ -281,8 +281,11 @@ def _checked(
     values, lines, without_number = values[~gaps], lines[~gaps], int(np.count_nonzero(gaps))
     _check_count(path, columns, len(values), without_number)
     for index, (key, column) in enumerate(columns.named.items()):
-        if key in ("sd", "loss_sd"):
-            _check_positive(path, column, values[:, index], lines)
+        for row in np.flatnonzero(values[:, index] <= 0)[:1] if key in ("sd", "loss_sd") else ():
+            raise BiogripError(
+                f"{place(path, lines[row], column)}: found {values[row, index]:.15g}, allowed is a "
+                "standard deviation above 0."
+            )
     if columns.partner:
         ascending = np.argsort(values[:, 0], kind="stable")
         values, lines = values[ascending], lines[ascending]
@@ -537,14 +540,6 @@ def _check_count(
         raise BiogripError(
             f"{place(path)}: found {counted(found, what)} with a number in {which}{gaps}, "
             f"allowed are at least {fewest}."
-        )
-
-
-def _check_positive(path: Path | None, column: str, sd: Array, lines: IntArray) -> None:
-    for row in np.flatnonzero(sd <= 0)[:1]:
-        raise BiogripError(
-            f"{place(path, lines[row], column)}: found {sd[row]:.15g}, allowed is a standard "
-            "deviation above 0."
         )
 
 
