@@ -11,7 +11,7 @@ from biogrip.physics.models import MODELS, Published, Sample
 from biogrip.records.identifications import ALL, MODEL_FITS, basins, columns, near_noise
 from biogrip.records.rows import write_object
 from biogrip.tables import cases
-from biogrip.tables.methods import methods, models
+from biogrip.tables.study import methods, models
 from tests.helpers.default import STUDY, seen, study_of
 
 FOUND = {"k": 9.0, "k_p": 1.0, "c": 3.0, "c_p": 2.0}
