@@ -8,11 +8,13 @@ import os
 import sys
 import traceback
 from collections import defaultdict
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from importlib.metadata import version
+from multiprocessing import get_context
+from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -35,7 +37,6 @@ from biogrip.command.settings import (
     read_table,
     read_trace,
 )
-from biogrip.command.side_by_side import side_by_side
 from biogrip.command.words import in_columns, in_words
 from biogrip.errors import BiogripError
 from biogrip.files import digest_of, refuse_inputs, software
@@ -46,6 +47,7 @@ from biogrip.identify.other_fits import Trace
 from biogrip.identify.prepare import prepare
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.keys import plain
+from biogrip.processes import end_with
 from biogrip.records.rows import write_rows
 from biogrip.study.source import default_config
 from biogrip.study.study import Case
@@ -61,6 +63,7 @@ _MOST_IN_BATCH, _MOST_READINGS = 25, 200_000
 
 _KILLED = "a process was killed, perhaps because memory ran out"
 
+J = TypeVar("J")
 T = TypeVar("T")
 
 
@@ -189,6 +192,62 @@ def _identify_traces(
             add(single, alone or Outcome([], {trace: text}))
     every.found.extend(found[own.name] for own in asked if own.name in found)
     return every
+
+
+def side_by_side(work: Callable[[J], T], jobs: Sequence[J], most: int) -> Iterator[T | None]:
+    """Yield what work gives of each job, in their order; None if its process was killed.
+
+    Each job has a process of its own, so that a kill costs no other its result. At most some are
+    there at once; they are forked, and end when this one does, however that ends. An error that
+    work raises is raised here.
+    """
+    fork = get_context("fork")
+    running: dict[Any, tuple[int, Any]] = {}
+    done: dict[int, T | None] = {}
+    started = given = 0
+    try:
+        while given < len(jobs):
+            while started < len(jobs) and len(running) < most:
+                ours, theirs = fork.Pipe(duplex=False)
+                job = ours, theirs, os.getpid(), work, jobs[started]
+                process = fork.Process(target=_send, args=job)
+                process.start()
+                # What nobody can write to any more has an end.
+                theirs.close()
+                running[ours] = started, process
+                started += 1
+            ready: list[Any] = wait([*running])
+            for one in ready:
+                number, process = running.pop(one)
+                try:
+                    done[number], error = one.recv()
+                except (EOFError, OSError):
+                    done[number], error = None, None
+                process.join()
+                if error is not None:
+                    raise error
+            while given in done:
+                yield done.pop(given)
+                given += 1
+    finally:
+        for ours, (_, process) in running.items():
+            ours.close()
+            process.join()
+
+
+def _send(
+    ours: Connection, theirs: Connection, parent: int, work: Callable[[J], T], job: J
+) -> None:
+    """Send what work gives, and the error that it raises, of which one is None."""
+    end_with(parent)
+    # If the parent ends before, nobody reads what is sent.
+    ours.close()
+    try:
+        found: tuple[T | None, Exception | None] = work(job), None
+    except Exception as error:
+        found = None, error
+    with suppress(OSError):
+        theirs.send(found)
 
 
 def _made_from(asked: Asked) -> str:
