@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from biogrip.figures.robustness import draw_robustness
+from biogrip.figures.overview import draw_robustness
 from biogrip.figures.style import save, styled
 from biogrip.stages.job import job_study, logged, paths
 from biogrip.tables.layout import write

@@ -24,7 +24,7 @@ from biogrip.physics.noise import Noise
 from biogrip.physics.protocol import Course, Phase, join_phases, sample_times
 from biogrip.physics.sample_model import Network, with_fixed
 from biogrip.study.case_blocks import CALIBRATED, OVERRIDABLE, CaseBlock
-from biogrip.study.config import StudyConfig
+from biogrip.study.config import StudyConfig, list_points, point_blocks
 from biogrip.study.messages import checked, schema_of
 from biogrip.study.source import (
     KeyPath,
@@ -37,7 +37,6 @@ from biogrip.study.source import (
     read_source,
     values_in,
 )
-from biogrip.study.sweeps import list_points, point_blocks
 from biogrip.traces.columns import Columns
 
 

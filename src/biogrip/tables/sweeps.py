@@ -18,8 +18,8 @@ from biogrip.physics.noise import rms
 from biogrip.physics.simulation import simulated_response
 from biogrip.records.identifications import near_noise, near_noise_words, read_batch
 from biogrip.records.rows import RowFile
+from biogrip.study.config import AxisBlock, Point
 from biogrip.study.study import Case, Study
-from biogrip.study.sweeps import AxisBlock, Point
 from biogrip.tables.layout import Column, Row, ShownTable
 
 POINTS = RowFile(
