@@ -33,6 +33,7 @@ from biogrip.physics.noise import Noise, add_noise
 from biogrip.physics.protocol import Phase, hold
 from biogrip.physics.simulation import simulated_response
 from biogrip.study.source import HOLD
+from biogrip.study.study import default_ranges
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -260,16 +261,6 @@ def to_table(
     return pd.DataFrame(rows, columns=header)
 
 
-# Ranges of the default study.
-_RANGES = {
-    "k": GeneRange((-3, 8), (1, 9)),
-    "k_p": GeneRange((-3, 8), (1, 9)),
-    "c": GeneRange((-4, 5), (1, 9)),
-    "c_p": GeneRange((-4, 5), (1, 9)),
-    "alpha": GeneRange((-1, 0), (1, 9)),
-}
-
-
 def set_up(
     gripper: Gripper | Instrument,
     protocol: tuple[Phase, ...],
@@ -298,7 +289,7 @@ def set_up(
     return Experiment(
         NO_ARMS if isinstance(gripper, Instrument) else gripper,
         protocol,
-        ranges or _RANGES,
+        ranges or default_ranges(),
         replace(sample, stiffness=instrument.stiffness),
         dict(fixed or {}),
         instrument,

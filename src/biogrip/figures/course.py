@@ -16,10 +16,8 @@ from biogrip.arrays import Array
 from biogrip.digits import with_unit
 from biogrip.figures import style
 from biogrip.figures.fit import SHOWN_SEEDS, first_of_basins, read_history, seeds_in_words
-from biogrip.judging.likelihood import bound
-from biogrip.judging.quantities import Quantity, parameters_and_sum
+from biogrip.judging.quantities import Quantity
 from biogrip.judging.verdicts import DETERMINED
-from biogrip.physics.noise import standard_deviation
 from biogrip.records.identifications import (
     ENCODABLE,
     chi_square_increase,
@@ -30,8 +28,8 @@ from biogrip.records.identifications import (
     read_verdicts,
     share_in_words,
 )
-from biogrip.records.traces import read_target
 from biogrip.study.study import Case
+from biogrip.tables.study import bounds_at_truth
 
 _TICKS = (0, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000)
 # Of increases of chi-squared, smaller ones being drawn there.
@@ -191,21 +189,15 @@ def draw_scatter(
     items = read_verdicts(expected)["quantities"]
     verdicts = {item["quantity"]: item["verdict"] for item in items}
     found = read_identifications(identifications, case)
-    experiment = case.experiment.calibrated(calibrated)
-    time_s, _, rotation = read_target(target, case.times_s)
-    log_truth = experiment.logs(case.parameters)
-    _, sensitivity = experiment.of(time_s, rotation).residuals(log_truth)
-    noise_sd = standard_deviation(rotation, case.noise)
-    quantities = parameters_and_sum(experiment.searched)
-    drawn, grid = style.row_of_panels(len(quantities), 3.1)
-    for index, (axes, quantity) in enumerate(zip(grid, quantities, strict=True)):
-        names = [experiment.searched.parameters[i] for i in quantity.members]
+    bounds = bounds_at_truth(case, target, calibrated)
+    drawn, grid = style.row_of_panels(len(bounds), 3.1)
+    for index, (axes, (quantity, limit)) in enumerate(zip(grid, bounds, strict=True)):
+        names = [case.experiment.searched.parameters[i] for i in quantity.members]
         value = sum(case.parameters[p.name] for p in names)
         if value == 0:
             axes.axis("off")
             continue
         ratios = found[[p.column for p in names]].sum(axis=1) / value
-        limit = bound(sensitivity, noise_sd, log_truth, quantity)
         verdict = verdicts[quantity.label]
         # The bound is a tangent at the truth: no use if the quantity is not determined, or if it
         # is zero.

@@ -80,7 +80,7 @@ def fits_of_basins(
 
 
 def fit_of(
-    problem: Experiment, parameters: Mapping[str, float], recorded: Measurements, seed: int
+    problem: Experiment, parameters: Mapping[str, float], recorded: Measurements, seed: int = TRACE
 ) -> Fit:
     """Return the trace of a seed, and the response of parameters with nuisance terms fitted.
 
@@ -161,7 +161,7 @@ def judged_fit(
     recorded = read_measurements(measurements, [TRACE])
     experiment = experiment_for(case.experiment, recorded, calibrated)
     found = {item["quantity"]: item["value"] for item in verdicts["quantities"]}
-    return fit_of(experiment, found, recorded, TRACE)
+    return fit_of(experiment, found, recorded)
 
 
 def draw_traces(axes: Axes, fits: Mapping[str, Fit]) -> tuple[float, str]:

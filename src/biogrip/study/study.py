@@ -208,9 +208,8 @@ class Case:
     @property
     def _given_ranges(self) -> frozenset[str]:
         """Names of search ranges that are not the default study's: those that the user gave."""
-        default = built(SearchRange, read_config(default_config())["search_range"])
-        given = vars(self.block.search_range).items()
-        return frozenset(name for name, genes in given if genes != getattr(default, name))
+        given = vars(self.block.search_range)
+        return frozenset(name for name, it in default_ranges().items() if it != given[name])
 
     @property
     def judged_experiment(self) -> Experiment:
@@ -378,6 +377,12 @@ class Study:
 
 
 _SHOWN = 6
+
+
+def default_ranges() -> dict[str, GeneRange]:
+    """Return the search ranges of the default study."""
+    found = built(SearchRange, read_config(default_config())["search_range"])
+    return dict[str, GeneRange](vars(found))
 
 
 def read_configs(files: Iterable[Path]) -> dict[str, Any]:

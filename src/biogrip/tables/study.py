@@ -1,6 +1,6 @@
 """Tables of a whole study: methods and models on its traces, and how often limits are true."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +10,7 @@ from scipy.stats import binomtest
 from biogrip.fit.nested_fits import aic_and_bic
 from biogrip.judging.levels import WIDE
 from biogrip.judging.likelihood import bound
-from biogrip.judging.quantities import parameters_and_sum
+from biogrip.judging.quantities import Quantity, parameters_and_sum
 from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
 from biogrip.physics.noise import standard_deviation
 from biogrip.records.identifications import (
@@ -24,7 +24,7 @@ from biogrip.records.identifications import (
 )
 from biogrip.records.rows import require_rows, seeds_of
 from biogrip.records.traces import read_target
-from biogrip.study.study import Study
+from biogrip.study.study import Case, Study
 from biogrip.tables.cases import error_percent, target_of
 from biogrip.tables.layout import Column, Row, ShownTable
 
@@ -162,24 +162,17 @@ def coverage(
     rows: list[Row] = []
     estimated = pd.concat([read_intervals(study, it) for it in intervals], ignore_index=True)
     for (name, case), target in zip(study.cases.items(), targets, strict=True):
-        experiment = case.experiment.calibrated([next(calibrations)] if case.is_calibrated else [])
-        log_truth = experiment.logs(case.parameters)
         found = estimated[estimated["case"] == name]
-        time_s, _, rotation = read_target(target, case.times_s)
-        _, sensitivity = experiment.of(time_s, rotation).residuals(log_truth)
-        noise_sd = standard_deviation(rotation, case.noise)
-        for quantity in parameters_and_sum(experiment.searched):
+        own = [next(calibrations)] if case.is_calibrated else []
+        for quantity, limit in bounds_at_truth(case, target, own):
             mine = found[found["quantity"] == quantity.label]
             fitted = mine[mine["estimate_rest_known"].notna()]
             shown = mine[mine["verdict"].notna()]
             if fitted.empty and not np.any(shown["verdict"] != NOT_DETERMINED):
                 continue
-            # The config's value: `log_truth` is clipped to the search range.
-            names = [experiment.searched.names[index] for index in quantity.members]
-            truth = sum(case.parameters[member] for member in names)
+            truth = target_of(quantity.label, case.parameters) or 0.0
             head = {"case": name, "quantity": quantity.label, "unit": quantity.unit}
-            limit = 100 * bound(sensitivity, noise_sd, log_truth, quantity)
-            numbers = _spreads(fitted, truth, limit, case.confidence) | _shown(shown, truth)
+            numbers = _spreads(fitted, truth, 100 * limit, case.confidence) | _shown(shown, truth)
             rows.append({**head, "target": truth, **numbers})
     caption = (
         "Least squares over many seeds, for every quantity that a case's traces should determine: "
@@ -193,6 +186,22 @@ def coverage(
         "often than the confidence says."
     )
     return ShownTable(caption, _COLUMNS, rows)
+
+
+def bounds_at_truth(
+    case: Case, target: Path, calibrated: Sequence[Path]
+) -> list[tuple[Quantity, float]]:
+    """Return what is searched of a case, each with its Cramér-Rao bound at the true parameters.
+
+    That is the standard deviation of the quantity's logarithm.
+    """
+    experiment = case.experiment.calibrated(calibrated)
+    time_s, _, rotation = read_target(target, case.times_s)
+    log_truth = experiment.logs(case.parameters)
+    _, sensitivity = experiment.of(time_s, rotation).residuals(log_truth)
+    noise_sd = standard_deviation(rotation, case.noise)
+    quantities = parameters_and_sum(experiment.searched)
+    return [(each, bound(sensitivity, noise_sd, log_truth, each)) for each in quantities]
 
 
 def read_intervals(study: Study, path: Path) -> pd.DataFrame:
