@@ -28,7 +28,7 @@ from biogrip.records.identifications import (
     read_readings,
     share_with_limits,
 )
-from biogrip.records.rows import read_frame
+from biogrip.records.rows import RowFile
 from biogrip.stages.job import job_study, logged, paths
 from biogrip.study.study import Case, Study
 from biogrip.tables.cases import value_in_case
@@ -307,7 +307,7 @@ def read_results(
 
     Runs under readings of the paper are in files named like their case.
     """
-    tables = {file.stem: read_frame(file, "a table", ()) for file in files}
+    tables = {file.stem: RowFile("a table", words=None).read(file) for file in files}
     add_columns(tables)
     verdicts = [table for name, table in tables.items() if name.startswith("verdicts_")]
     tables["verdicts"] = pd.concat(verdicts, ignore_index=True)

@@ -381,7 +381,12 @@ def data_of(
         **trace_data(diagnosis),
         "without_model": diagnosis.without_model(case.block.identifiability.at_s).data(),
         "assumed": _assumed(diagnosis, case, list(tried or case.models)),
-        "by_default": _by_default(given) if case.instrument.has_jaws else [],
+        # What the user does not set; uncertainties are no gripper.
+        "by_default": [
+            name
+            for name in ("gripper", "protocol")
+            if case.instrument.has_jaws and not {*(given.get(name) or ())} - {"uncertainty"}
+        ],
         "versions": {
             "biogrip": __version__,
             **{name: version(name) for name in ("numpy", "scipy")},
@@ -414,9 +419,3 @@ def _assumed(diagnosis: Diagnosis, case: Case, tried: Sequence[str]) -> dict[str
         "model_selection": {"models": list(tried)},
         "study_seed": case.study.config.study_seed,
     }
-
-
-def _by_default(given: Mapping[str, Any]) -> list[str]:
-    """Return which of gripper and protocol the user does not set; uncertainties are no gripper."""
-    blocks = ("gripper", "protocol")
-    return [name for name in blocks if not set(given.get(name) or ()) - {"uncertainty"}]

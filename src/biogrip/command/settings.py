@@ -296,7 +296,10 @@ def _with_instrument(
         level = None
     elif level is not None:
         level = controlled.in_si(*held_unit(level, controlled, by))
-    own = _recording(asked, block)
+    own = None
+    # Whoever uses the trace says what is wrong.
+    with suppress(BiogripError):
+        own = asked.read(block.columns) if block else None
     phase = {"duration_s": 1.0, controlled.column: 1.0 if level is None else level}
     record, start_s = None, measurement.get("start_s")
     if own is not None and own.load is not None:
@@ -347,13 +350,6 @@ def _instrument(merged: Mapping[str, Any], given: Mapping[str, Any]) -> Instrume
     some = [each for each in INSTRUMENTS.values() if each.kind == kind] or [GRIPPER]
     keys = {path[-1] for path in keys_in(merged.get("protocol"))}
     return next((each for each in some if each.controlled.column in keys), some[0])
-
-
-def _recording(asked: Asked, block: MeasurementBlock | None) -> Recording | None:
-    """Read a trace; return None if whoever uses it will say what is wrong."""
-    with suppress(BiogripError):
-        return None if block is None else asked.read(block.columns)
-    return None
 
 
 def check_settings(traces: Sequence[Asked]) -> None:

@@ -329,8 +329,8 @@ def _coloured(text: str, verdict: str) -> str:
 
 REFERENCE = (
     "The biogrip authors, biogrip: how well a MEMS microgripper identifies the viscoelastic "
+    f"parameters of a cell, version {__version__}, 2026"
 )
-REFERENCE += f"parameters of a cell, version {__version__}, 2026"
 """How biogrip is cited, as in CITATION.cff."""
 
 _INSTRUMENTS = {

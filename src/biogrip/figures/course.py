@@ -1,6 +1,6 @@
 """Runs of the methods: Figures 8 and 10 over generations, where all runs end, and their errors."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from statistics import NormalDist
 from typing import Any
@@ -203,7 +203,9 @@ def draw_scatter(
         # is zero.
         known = limit if limit and verdict == DETERMINED else np.inf
         _quantity(axes, case, found["method"], ratios.to_numpy(float), known)
-        _paper(axes, case.published.identified, [p.name for p in names], value)
+        if {p.name for p in names} <= {*(printed := case.published.identified)}:
+            ratio = np.clip(sum(printed[p.name] for p in names) / value, *axes.get_ylim())
+            axes.axhline(ratio, color=style.PAPER, linewidth=1.2, linestyle=(0, (4, 2)))
         style.panel(axes, "abcdefghijklmnopqrstuvwxyz"[index], _title(quantity, known, verdict), 60)
         if index == 0:
             axes.set_ylabel("identified / target")
@@ -247,13 +249,6 @@ def _quantity(
         axes.yaxis.set_major_locator(MaxNLocator(5))
     axes.set(ylim=(bottom, top), xlim=(-0.6, len(names) - 0.4))
     axes.set_xticks([])
-
-
-def _paper(axes: Axes, identified: Mapping[str, float], names: list[str], target: float) -> None:
-    if all(name in identified for name in names):
-        low, high = axes.get_ylim()
-        value = float(np.clip(sum(identified[name] for name in names) / target, low, high))
-        axes.axhline(value, color=style.PAPER, linewidth=1.2, linestyle=(0, (4, 2)))
 
 
 def _title(quantity: Quantity, limit: float, verdict: str) -> str:

@@ -318,7 +318,8 @@ def draw_robustness(study: Study, name: str, points: Path) -> Figure:
         _write(grid[0, index], shares, _SHARE(shares[0]), "cividis", height / rows)
         chosen = headlines_of(found)
         for axes, quantity in zip(grid[1:, index], chosen, strict=False):
-            axes.set_title(f"{_symbol(quantity)}: error there (bound) in %", fontsize=7.5)
+            symbol = re.sub(r"_(\w+)", r"_{\1}", quantity)
+            axes.set_title(f"${symbol}$: error there (bound) in %", fontsize=7.5)
             own = first[first["quantity"] == quantity]
             error, bound = (_grid(sweep, own, f"{it}_percent") for it in ("basin_error", "bound"))
             # Clip, since an error of zero has no logarithm.
@@ -386,8 +387,3 @@ def _short(number: float) -> str:
     if number >= 10_000:
         return f"{number:.0e}".replace("e+0", "e")
     return f"{number:.0f}" if number >= 10 else f"{number:.{1 if number < 0.1 else 2}g}"
-
-
-def _symbol(quantity: str) -> str:
-    """Return a quantity's label as mathtext."""
-    return "$" + re.sub(r"_(\w+)", r"_{\1}", quantity) + "$"

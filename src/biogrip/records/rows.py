@@ -51,10 +51,10 @@ class RowFile:
 
     what: str
     """Content of a row, for messages."""
-    columns: tuple[str, ...]
-    """Column names."""
-    words: tuple[str, ...] = ()
-    """Columns of text, even if it looks like numbers."""
+    columns: tuple[str, ...] = ()
+    """Names of columns; a file may have more."""
+    words: tuple[str, ...] | None = ()
+    """Columns of text, even if it looks like numbers; None if any may be text."""
 
     def write(self, path: Path, rows: Iterable[Sequence[Any]]) -> None:
         """Write a header and rows, consuming an iterator row by row."""
@@ -62,7 +62,23 @@ class RowFile:
 
     def read(self, path: Path, **known: Collection[Any]) -> "pd.DataFrame":
         """Read all rows, which are those of every combination of what is known of columns."""
-        frame = read_frame(path, self.what, self.columns, self.words)
+        import pandas as pd
+
+        text, words = whole(path, self.what), self.words
+        try:
+            frame = pd.read_csv(StringIO(text, newline=""), dtype=dict.fromkeys(words or (), str))
+        except ValueError as error:
+            raise BiogripError(
+                f"{path}: cannot be read as {self.what}: {error}. {AGAIN}"
+            ) from error
+        if not {*self.columns} <= {*frame.columns}:
+            raise BiogripError(f"{path}, line 1: wanted the columns {', '.join(self.columns)}.")
+        for column in frame.columns:
+            if frame.empty or pd.api.types.is_numeric_dtype(frame[column]):
+                continue
+            if words is not None and column not in words:
+                raise BiogripError(f"{path}: {column}: not all are numbers. {AGAIN}")
+            frame[column] = frame[column].map(as_it_was)
         if known:
             require_rows(path, frame, [*known], product(*known.values()))
         return frame
@@ -130,33 +146,6 @@ def require_rows(
     lacking = [row for row in known if row not in {*found}]
     text = f", and none of {', '.join(map(str, lacking[0]))}" if lacking else ""
     raise BiogripError(f"{path}: found {len(found)} rows, wanted {len(known)}{text}. {AGAIN}")
-
-
-def read_frame(
-    path: Path, what: str, columns: Sequence[str], words: Sequence[str] | None = None
-) -> "pd.DataFrame":
-    """Read rows of a CSV file that have at least the given columns.
-
-    Those of words are text even if it looks like numbers, all others numbers; without words, any
-    may be text. `what` says in messages what the file holds.
-    """
-    import pandas as pd
-
-    text = whole(path, what)
-    try:
-        frame = pd.read_csv(StringIO(text, newline=""), dtype=dict.fromkeys(words or (), str))
-    except ValueError as error:
-        raise BiogripError(f"{path}: cannot be read as {what}: {error}. {AGAIN}") from error
-    if not set(columns) <= set(frame.columns):
-        raise BiogripError(f"{path}, line 1: wanted the columns {', '.join(columns)}.")
-    for column in frame.columns:
-        numbers = frame.empty or pd.api.types.is_numeric_dtype(frame[column])
-        if words is not None and column not in words and not numbers:
-            raise BiogripError(f"{path}: {column}: not all are numbers. {AGAIN}")
-    for column in frame.columns:
-        if not pd.api.types.is_numeric_dtype(frame[column]):
-            frame[column] = frame[column].map(as_it_was)
-    return frame
 
 
 def read_rows(path: Path, columns: Sequence[str] | None = None) -> list[list[str]]:

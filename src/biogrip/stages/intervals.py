@@ -85,7 +85,8 @@ def _rows(
             for which, finding in zip(shown, findings, strict=True):
                 given = (finding, known[index]) if which in selected else None
                 texts = _estimates(every[which], judged[index].likelihood.best, given)
-                verdict = _verdict(finding) if in_full else ["", "", ""]
+                limits = ("" if it is None else f"{it:.5g}" for it in (finding.low, finding.high))
+                verdict = (finding.verdict, *limits) if in_full else ("", "", "")
                 yield case.name, every[which].label, seed, *texts, *verdict
         progress.done(len(group))
 
@@ -152,8 +153,3 @@ def _estimates(
         narrow = low is not None and high is not None and high - low < _NARROW
         digits = _MORE_DIGITS if narrow else _DIGITS
     return ["" if log is None else f"{math.exp(log):.{digits}g}" for log in logs]
-
-
-def _verdict(found: Finding) -> list[str]:
-    limits = ["" if limit is None else f"{limit:.5g}" for limit in (found.low, found.high)]
-    return [found.verdict, *limits]
