@@ -15,7 +15,7 @@ from matplotlib.ticker import LogLocator, MaxNLocator
 from biogrip.arrays import Array
 from biogrip.digits import with_unit
 from biogrip.figures import style
-from biogrip.figures.fit import SHOWN_SEEDS, first_of_basins, read_history, seeds_in_words
+from biogrip.figures.fit import SHOWN_SEEDS, first_of_basins, seeds_in_words
 from biogrip.judging.quantities import Quantity
 from biogrip.judging.verdicts import DETERMINED
 from biogrip.records.identifications import (
@@ -24,6 +24,7 @@ from biogrip.records.identifications import (
     near_noise,
     near_noise_words,
     reached_encodable,
+    read_histories,
     read_identifications,
     read_verdicts,
     share_in_words,
@@ -50,16 +51,29 @@ def _name_seeds(axes: Axes, seeds: int, first: Iterable[str]) -> None:
         axes.plot([], [], color=color, label=words)
 
 
+def _runs(
+    case: Case, identifications: Path, histories: Path, values: Sequence[str]
+) -> tuple[pd.DataFrame, list[str], list[int], pd.DataFrame]:
+    """Return runs of the shown method, names and seeds of the first in each basin, and histories.
+
+    Histories are those of the seeds drawn individually and of these first ones.
+    """
+    method = case.study.shown_method.name
+    found = read_identifications(identifications, case, method)
+    first = first_of_basins(found, case.study.near_noise_tolerance)
+    shown = [int(run["seed"]) for run in first.values()]
+    history = read_histories(histories, method, values)
+    drawn = history["seed"].isin({*range(SHOWN_SEEDS), *shown})
+    return found, list(first), shown, history[drawn]
+
+
 def draw_convergence(case: Case, identifications: Path, histories: Path) -> Figure:
     """Draw each seed's excess of the misfit over its noise, highlighting a run of each basin."""
     method, tolerance = case.study.shown_method, case.study.near_noise_tolerance
-    found = read_identifications(identifications, case, method.name)
+    found, first, shown, history = _runs(case, identifications, histories, ["best_misfit"])
     noise = found.set_index("seed")["noise_rms"]
     noisy = bool((noise > 0).all())
     unit = noise if noisy else pd.Series(found["misfit"].min(), index=noise.index)
-    first = first_of_basins(found, tolerance)
-    shown = [int(run["seed"]) for run in first.values()]
-    history = read_history(histories, method.name, shown)
     drawn = style.figure(style.COLUMN_IN, 2.9)
     axes = drawn.subplots()
     for seed, rows in history.groupby("seed"):
@@ -107,13 +121,9 @@ def _mark_mutation(axes: Axes, start: int, last: int) -> None:
 
 def draw_evolution(case: Case, identifications: Path, histories: Path) -> Figure:
     """Draw every parameter over generations for all seeds, highlighting a run of each basin."""
-    method = case.study.shown_method
-    found = read_identifications(identifications, case, method.name)
-    first = first_of_basins(found, case.study.near_noise_tolerance)
-    shown = [int(run["seed"]) for run in first.values()]
     parameters, identified = case.sample.model.parameters, case.published.identified
     columns = [parameter.column for parameter in parameters]
-    history = read_history(histories, method.name, shown, columns)
+    found, first, shown, history = _runs(case, identifications, histories, columns)
     drawn = style.figure(style.COLUMN_IN, 1.2 + 1.5 * (rows := -(-len(parameters) // 2)))
     grid = drawn.subplots(rows, 2, sharex=True).ravel()
     for axes, parameter in zip(grid, parameters, strict=False):
@@ -132,7 +142,7 @@ def draw_evolution(case: Case, identifications: Path, histories: Path) -> Figure
     for axes in grid[len(parameters) :]:
         axes.set_axis_off()
     for axes in grid[len(parameters) - 2 : len(parameters)]:
-        axes.set_xlabel(method.step)
+        axes.set_xlabel(case.study.shown_method.step)
         axes.tick_params(labelbottom=True)
     _name_seeds(grid[0], len(found), first)
     if case.parameters:

@@ -1,6 +1,6 @@
 """Figures 9, 11 and 12: target, noisy trace, fits, and the residuals; and the force of the jaws."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,6 @@ from biogrip.physics.unilateral import UnilateralResponse, unilateral_response
 from biogrip.records.identifications import (
     ALL,
     basins,
-    read_histories,
     read_identifications,
     read_verdicts,
 )
@@ -107,14 +106,6 @@ def seeds_in_words(count: int) -> str:
     if count == 1:
         return "the only trace"
     return f"all {count} seeds" if count <= SHOWN_SEEDS else f"first {SHOWN_SEEDS} of {count} seeds"
-
-
-def read_history(
-    path: Path, method: str, shown: Sequence[int], values: Sequence[str] = ("best_misfit",)
-) -> pd.DataFrame:
-    """Read one method's histories of the seeds drawn individually and of those shown."""
-    found = read_histories(path, method, values)
-    return found[found["seed"].isin({*range(SHOWN_SEEDS), *shown})]
 
 
 def scale_of(values: Array, unit: str) -> tuple[float, str]:

@@ -186,15 +186,8 @@ def read_recording(path: Path, columns: Columns) -> Recording:
 
     An empty cell, ``nan``, ``NA``, ``N/A``, ``#N/A``, ``#NV`` (in any case) or ``-`` is a gap. Its
     row is left out and counted; nothing is interpolated. Other spreadsheet errors, as ``#REF!``,
-    are refused.
-
-    Raises
-    ------
-    BiogripError
-        If the file is no text, lacks a column or repeats it, has it in several blocks of which none
-        is named, a unit is unknown or contradicted, a row has too few or too many cells, or text
-        that is neither a finite number nor a gap, a standard deviation is not positive, the time
-        does not increase, or there are fewer than `FEWEST_SAMPLES` samples.
+    are refused. A `BiogripError` has file, line and column of what cannot be used, and what is
+    allowed.
     """
     sheet, quantity = read_sheet(path, columns), columns.quantity
     if columns.reading == quantity.name and quantity.name not in sheet.cells:
@@ -249,12 +242,8 @@ def read_recording(path: Path, columns: Columns) -> Recording:
 def recording_of_arrays(columns: Columns, *arrays: Array) -> Recording:
     """Return a recording of times, readings and perhaps standard deviations, (n_samples,) each.
 
-    Messages and units go by the names in `columns`; a row with a NaN is a gap.
-
-    Raises
-    ------
-    BiogripError
-        As `read_recording`, or if `columns` asks for what only a file has.
+    Messages and units go by the names in `columns`; a row with a NaN is a gap. A `BiogripError`
+    is as of `read_recording`, or says that `columns` asks for what only a file has.
     """
     for key in ("block", "rows", "load"):
         if getattr(columns, key) is not None:
