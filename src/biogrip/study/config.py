@@ -54,6 +54,10 @@ class ValueBlock(BaseModel):
         return self.__pydantic_extra__
 
 
+_Keys = Distinct[Annotated[tuple[str, ...], Field(min_length=1, max_length=100)]]
+_Value = Annotated[_Number | _Text | Annotated[ValueBlock, Tag("a block of keys")], BY_KIND]
+
+
 @dataclass(frozen=True)
 class Value:
     """A value on an axis of a sweep's grid."""
@@ -72,22 +76,10 @@ class AxisBlock(Block):
 
     label: Printed
     """Name in print."""
-    key: Annotated[
-        Annotated[str, Tag("text")]
-        | Annotated[
-            tuple[str, ...], Field(min_length=1, max_length=100), Distinct(), Tag("a list")
-        ],
-        BY_KIND,
-    ]
+    key: Annotated[Annotated[str, Tag("text")] | Annotated[_Keys, Tag("a list")], BY_KIND]
     """Dotted key, or list of keys that change together, in any block that a case may change, e.g.
     `measurement.noise.level`."""
-    values: Annotated[
-        tuple[
-            Annotated[_Number | _Text | Annotated[ValueBlock, Tag("a block of keys")], BY_KIND], ...
-        ],
-        Field(min_length=1, max_length=16),
-        Distinct(),
-    ]
+    values: Distinct[Annotated[tuple[_Value, ...], Field(min_length=1, max_length=16)]]
     """Values of the key; or blocks to merge into the block of the key, each with a `label` of its
     own."""
     unit: Printed | None = None
@@ -148,7 +140,7 @@ class Point:
 class SweepBlock(Block):
     """A grid of cases that differ from given cases in two values."""
 
-    cases: Annotated[tuple[str, ...], Field(min_length=1, max_length=16), Distinct()]
+    cases: Distinct[Annotated[tuple[str, ...], Field(min_length=1, max_length=16)]]
     """Cases of the study that the grid is laid over."""
     rows: AxisBlock
     columns: AxisBlock
@@ -245,7 +237,7 @@ _Candidate = Annotated[str, OneOf(CANDIDATES), USUAL_NAMES]
 class ModelSelection(Block):
     """Selection of the simplest adequate sample model by AIC and BIC."""
 
-    models: Annotated[tuple[_Candidate, ...], Field(max_length=100), Distinct()]
+    models: Distinct[Annotated[tuple[_Candidate, ...], Field(max_length=100)]]
     """Sample models fitted to every trace, beside that of its case; with an empty list none are. A
     number counts Maxwell branches."""
 
@@ -284,7 +276,7 @@ class DesignBlock(Block):
     largest."""
     duration_s: Annotated[float | None, Field(ge=1e-6, le=1e9)] = None
     """Duration. By default the protocol's."""
-    parameters: Annotated[tuple[str, ...], Field(max_length=40), Distinct()] = ()
+    parameters: Distinct[Annotated[tuple[str, ...], Field(max_length=40)]] = ()
     """Parameters asked for; the others are unknown all the same. By default all that are not
     fixed."""
 
@@ -321,8 +313,8 @@ class StudyConfig(Shared):
     """Whether figures are also written as PDF. Changes no result."""
     actuator: CombDrive
     """The rotary comb drive (Table 2)."""
-    methods: Annotated[
-        tuple[Annotated[str, OneOf(METHODS)], ...], Field(min_length=1, max_length=100), Distinct()
+    methods: Distinct[
+        Annotated[tuple[Annotated[str, OneOf(METHODS)], ...], Field(min_length=1, max_length=100)]
     ]
     """Identification methods applied to every trace. Tables 5-7 and figures of single fits show the
     first."""
@@ -342,7 +334,7 @@ class StudyConfig(Shared):
     traces: TracesBlock | None = None
     """A table of recorded traces, which are identified in batches beside the cases, as `biogrip
     identify` does."""
-    only: Annotated[tuple[str, ...], Field(min_length=1, max_length=_MOST_CASES), Distinct()] = ()
+    only: Distinct[Annotated[tuple[str, ...], Field(min_length=1, max_length=_MOST_CASES)]] = ()
     """Names of the cases to run; the others are left out. By default all under `cases`."""
     design: DesignBlock = DesignBlock()
     sweeps: Annotated[
