@@ -377,11 +377,10 @@ def plot(experiment: Experiment, time_s: ArrayLike, readings: ArrayLike, found: 
     """Draw a trace, its fit and the residuals."""
     from biogrip.figures.fit import draw_fit, fit_of
     from biogrip.figures.style import styled
-    from biogrip.records.traces import Measurements
 
     values = dict(zip(experiment.searched.names, map(float, found.parameters), strict=True))
-    times, read = as_column(time_s, "time_s"), as_column(readings, "readings")
-    fit = fit_of(experiment, values, Measurements(times, None, {0: read}), 0)
+    trace = as_column(time_s, "time_s"), as_column(readings, "readings")
+    fit = fit_of(experiment, values, *trace)
     with styled():
         return draw_fit({"best fit": fit}, "")
 

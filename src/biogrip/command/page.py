@@ -35,7 +35,6 @@ from biogrip.judging.without_model import LEVEL, level_turned
 from biogrip.page.page import TEMPLATES, data_url
 from biogrip.physics.protocol import evaluate, hold, join_phases
 from biogrip.physics.simulation import simulated_response
-from biogrip.records.traces import of_recording
 from biogrip.terminal import visible_lines
 
 _MARKS = {OK: "✓", DOUBTFUL: "!", REJECTED: "✕"}
@@ -100,7 +99,7 @@ def draw_best(diagnosis: Diagnosis) -> Figure:
     assert experiment is not None
     assert recording is not None
     found = {finding.quantity.label: finding.value for finding in diagnosis.findings}
-    fit = fit_of(experiment, found, of_recording(recording), 0)
+    fit = fit_of(experiment, found, recording.time_s, recording.readings, recording.sd)
     start_s = recording.onset_s or 0.0
     spread = style.is_over_decades(fit.time_s)
     if not spread:

@@ -74,26 +74,33 @@ def fits_of_basins(
         holding = next(path for path in measurements if seed in seeds_of(path.stem))
         recorded = read_measurements(holding, [seed])
         experiment = experiment_for(case.experiment, recorded, calibrated)
-        fits[f"fit ({words})"] = fit_of(experiment, values, recorded, seed)
+        fits[f"fit ({words})"] = _fit_of_seed(experiment, values, recorded, seed)
     return fits
 
 
 def fit_of(
-    problem: Experiment, parameters: Mapping[str, float], recorded: Measurements, seed: int = TRACE
+    problem: Experiment,
+    parameters: Mapping[str, float],
+    time_s: Array,
+    measured: Array,
+    sd: Array | None = None,
+    target: Array | None = None,
 ) -> Fit:
-    """Return the trace of a seed, and the response of parameters with nuisance terms fitted.
+    """Return a trace, and the response of parameters with nuisance terms fitted.
 
     Fixed parameters need not be given.
     """
     network = problem.model.sample({**parameters, **problem.fixed})
-    simulated = simulated_response(
-        problem.gripper, network, problem.torque, recorded.time_s, nonlinear=False
-    )[0]
-    measured = recorded.readings[seed]
-    nuisance = problem.nuisance(recorded.time_s)
-    fitted = simulated + within(nuisance, measured - simulated, recorded.sd)
-    target, read = recorded.target, problem.instrument.read
-    return Fit(recorded.time_s, target, measured, fitted, recorded.sd, read)
+    device = problem.gripper, network, problem.torque
+    simulated = simulated_response(*device, time_s, nonlinear=False)[0]
+    fitted = simulated + within(problem.nuisance(time_s), measured - simulated, sd)
+    return Fit(time_s, target, measured, fitted, sd, problem.instrument.read)
+
+
+def _fit_of_seed(
+    problem: Experiment, parameters: Mapping[str, float], made: Measurements, seed: int
+) -> Fit:
+    return fit_of(problem, parameters, made.time_s, made.readings[seed], made.sd, made.target)
 
 
 def first_seeds(found: pd.DataFrame) -> pd.DataFrame:
@@ -152,7 +159,7 @@ def judged_fit(
     recorded = read_measurements(measurements, [TRACE])
     experiment = experiment_for(case.experiment, recorded, calibrated)
     found = {item["quantity"]: item["value"] for item in verdicts["quantities"]}
-    return fit_of(experiment, found, recorded)
+    return _fit_of_seed(experiment, found, recorded, TRACE)
 
 
 def draw_traces(axes: Axes, fits: Mapping[str, Fit]) -> tuple[float, str]:

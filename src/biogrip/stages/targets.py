@@ -22,7 +22,6 @@ from biogrip.physics.unilateral import unilateral_response
 from biogrip.records.rows import write_arrays
 from biogrip.records.traces import (
     Measurements,
-    of_recording,
     read_target,
     write_measurements,
     write_target,
@@ -117,6 +116,9 @@ def record(case: Case, recorded: Path, measurements: Path) -> None:
     if case.columns.load is not None:
         raise BiogripError(f"{place(recorded)}: measurement.load is only for biogrip identify.")
     trace, _ = prepare(read_recording(recorded, case.columns), case.experiment)
-    for remark in trace.remarks():
+    remarks = tuple(trace.remarks())
+    for remark in remarks:
         warn(f"{place(recorded)}: {remark}")
-    write_measurements(measurements, of_recording(trace))
+    known = trace.sd, trace.sd_known, trace.onset_s, remarks
+    found = Measurements(trace.time_s, None, {0: trace.readings}, *known)
+    write_measurements(measurements, found)

@@ -351,11 +351,6 @@ class Study:
         return self.config.protocol.make_phases(GRIPPER, self.actuator)
 
     @property
-    def ranges(self) -> dict[str, GeneRange]:
-        """Search ranges of all parameters, by the name of the range."""
-        return dict[str, GeneRange](vars(self.config.search_range))
-
-    @property
     def identifiers(self) -> dict[str, Method]:
         """Declarations of the methods, by name."""
         return {name: METHODS[name] for name in self.config.methods}
