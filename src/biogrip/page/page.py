@@ -142,9 +142,8 @@ def write_report(
     for entry in figures:
         if entry.file not in placed:
             folded.setdefault(owners.get(entry.whose, "The study"), []).append(entry)
-    found = [read_verdicts(path) for path in files["verdicts"]]
-    by_case = zip(cases, found, strict=True)
-    own = [it for case, it in by_case if case.recorded and not study.published]
+    found = [*zip(cases, map(read_verdicts, files["verdicts"]), strict=True)]
+    own = [it for case, it in found if case.recorded and not study.published]
     asked = compared, study.shown_method.title
     who = "Run again, the paper's" if study.published else "The"
     shown = {
@@ -158,12 +157,12 @@ def write_report(
         ],
         "compared": answers.rows_beside_the_paper(beside, titles)
         or answers.compared_rows(errors, judged, titles),
-        "cases": list(zip(cases, found, strict=True)),
+        "cases": found,
         "better": {
             case.name: answers.say_which_model_is_better(
                 models, case.name, case.sample.candidate, own["fit"]
             )
-            for case, own in zip(cases, found, strict=True)
+            for case, own in found
         },
         "told": told,
         "story": story,

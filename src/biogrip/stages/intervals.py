@@ -46,21 +46,16 @@ def estimate(
 
     The noise of a seed is that of its measurement.
     """
+    INTERVALS.write(intervals, _rows(case, seeds, target, expected, calibrated))
+
+
+def _rows(
+    case: Case, seeds: Sequence[int], target: Path, expected: Path, calibrated: list[Path]
+) -> Iterator[tuple[str | int, ...]]:
     experiment = case.judged_experiment.calibrated(calibrated)
     time_s, _, rotation = read_target(target, case.times_s)
     found = read_verdicts(expected)["quantities"]
     determined = {item["quantity"] for item in found if item["verdict"] == DETERMINED}
-    INTERVALS.write(intervals, _rows(case, experiment, seeds, time_s, rotation, determined))
-
-
-def _rows(
-    case: Case,
-    experiment: Experiment,
-    seeds: Sequence[int],
-    time_s: Array,
-    rotation: Array,
-    determined: set[str],
-) -> Iterator[tuple[str | int, ...]]:
     every = parameters_and_sum(experiment.searched)
     selected = [index for index, quantity in enumerate(every) if quantity.label in determined]
     rest_known, informed, truth = _rest_known(case, experiment, time_s, rotation)
