@@ -364,8 +364,8 @@ def test_only_what_can_be_published_is_said_for_a_paper() -> None:
         "c + c_p > 1e-09 N s/m (97.5 % one-sided limit, n = 1 trace)",
     ]
     assert lines[0][1] == (
-        r"$c + c_{p} = 2 \times 10^{-9}\,\mathrm{N\,s/m}$ (95\,\% profile-likelihood interval "
-        r"$1 \times 10^{-9}$ to $40$, $n = 1$ trace, provided it relaxes)"
+        r"$c + c_{p}$ = $2 \times 10^{-9}$ N s/m (95 \% profile-likelihood interval "
+        r"$1 \times 10^{-9}$ to 40, n = 1 trace, provided it relaxes)"
     )
 
 

@@ -194,20 +194,16 @@ def for_a_paper(found: Mapping[str, Any]) -> list[tuple[str, str]]:
             numbers = within_limits(each["value"], low, high)
         provided = f", provided {each['provided']}" if each["provided"] else ""
         value, reach = f"{numbers[0]} {each['unit']}".rstrip(), " to ".join(numbers[1:])
-        text = f"{each['quantity']} {sign} {value} ({confidence:g} % {f'{kind} {reach}'.rstrip()}, "
-        text += f"n = 1 trace{provided})"
-        numbers = [re.sub(r"e([+-]\d+)", _power_in_latex, it) for it in numbers]
-        unit = each["unit"].replace(" ", r"\,")
-        value = numbers[0] + (rf"\,\mathrm{{{unit}}}" if unit else "")
-        reach = " to ".join(f"${it}$" for it in numbers[1:])
-        latex = rf"${each['symbol'].replace('$', '')} {sign} {value}$ ({confidence:g}\,\% "
-        latex += rf"{f'{kind} {reach}'.rstrip()}, $n = 1$ trace{provided})"
-        pairs.append((text, latex))
+        told = f" {sign} {value} ({confidence:g} % {f'{kind} {reach}'.rstrip()}, n = 1 trace"
+        told += f"{provided})"
+        pairs.append((f"{each['quantity']}{told}", f"{each['symbol']}{_in_latex(told)}"))
     return pairs
 
 
-def _power_in_latex(exponent: re.Match[str]) -> str:
-    return rf" \times 10^{{{int(exponent[1])}}}"
+def _in_latex(text: str) -> str:
+    """Return text as LaTeX, with powers of ten as mathematics."""
+    latex = text.translate(_LATEX_OF)
+    return _POWER.sub(lambda it: rf"${it[1]} \times 10^{{{int(it[2])}}}$", latex)
 
 
 def further_notes(found: Mapping[str, Any]) -> list[str]:
@@ -340,10 +336,10 @@ _INSTRUMENTS = {
     "oscillation": "In oscillation storage and loss moduli were recorded over frequency",
 }
 _MOST_PHASES, _MOST_REFUSED = 4, 3
-_IN_LATEX = str.maketrans(
+_LATEX_OF = str.maketrans(
     {
         **{sign: rf"\{sign}" for sign in "%_&#${}"},
-        **{"\\": r"\textbackslash{}", "^": r"\^{}", "~": r"\~{}"},
+        **{"\\": r"\textbackslash{}", "^": r"\^{}", "~": r"\~{}", "<": "$<$", ">": "$>$"},
         **{"²": "$^2$", "χ": r"$\chi$", "τ": r"$\tau$", "Δ": r"$\Delta$", "→": r"$\to$"},
     }
 )
@@ -467,7 +463,4 @@ def paragraph(sentences: Iterable[str], version: str = __version__) -> tuple[str
     """Return a paragraph as text and as LaTeX; at its end the software."""
     reference = REFERENCE.replace(__version__, version)
     text = " ".join([*sentences, f"Computed with biogrip {version} ({reference})."])
-    latex = _POWER.sub(
-        lambda it: rf"${it[1]} \times 10^{{{int(it[2])}}}$", text.translate(_IN_LATEX)
-    )
-    return legible(text), latex
+    return legible(text), _in_latex(text)
