@@ -142,7 +142,7 @@ class _Set(argparse.Action):
         namespace.settings = [*namespace.settings, Setting(str(option), path, value)]
 
 
-def _add_settings(parser: Any, outputs: Callable[[Any], None] | None = None) -> None:
+def _add_settings(parser: Any, *, outputs: bool = False) -> None:
     """Add traces, and options that say what they are of."""
     parser.set_defaults(settings=[])
     parser.lists_models = True
@@ -168,8 +168,12 @@ def _add_settings(parser: Any, outputs: Callable[[Any], None] | None = None) -> 
             of_key = {"dest": "model_selection.models", "nargs": 0, "const": []}
             text = "do not try other models, which takes most of the time"
             group.add_argument("--no-compare", action=_Set, help=text, **of_key)
-            if outputs:
-                outputs(parser.add_argument_group("output"))
+        if title == "the sample" and outputs:
+            group = parser.add_argument_group("output")
+            _add_file(group, "--report", "PAGE", "HTML page with pictures")
+            _add_file(group, "--csv", "TABLE", "CSV file, a row per trace", dest="table")
+            text = "JSON file, of one trace [TRACE.identified.json]"
+            _add_file(group, "--output", "FILE", text)
 
 
 def _add_identify(commands: Any) -> None:
@@ -188,13 +192,7 @@ def _add_identify(commands: Any) -> None:
     identify.cost = (
         "A trace takes seconds, most of them for comparing the sample models: --no-compare."
     )
-    _add_settings(identify, _add_outputs)
-
-
-def _add_outputs(group: Any) -> None:
-    _add_file(group, "--report", "PAGE", "HTML page with pictures")
-    _add_file(group, "--csv", "TABLE", "CSV file, a row per trace", dest="table")
-    _add_file(group, "--output", "FILE", "JSON file, of one trace [TRACE.identified.json]")
+    _add_settings(identify, outputs=True)
 
 
 def _add_file(parser: Any, name: str, metavar: str, text: str, **more: Any) -> None:
