@@ -93,6 +93,8 @@ class Specimen:
     """The sample of a case, and how it answers a unit step."""
 
     case: Case
+    parameters: Array
+    """Values of the searched parameters, (n_parameters,)."""
     noise: float
     """Standard deviation of the noise, in the SI unit of what is read."""
     required: BoolArray
@@ -104,13 +106,6 @@ class Specimen:
     unit: Array
     """After a unit step, derivatives of what is read by the log-parameters, and the force of the
     jaws if there are any, at `Limits.elapsed_s`, (n_parameters + 1 or 0, n_times)."""
-
-    @property
-    def parameters(self) -> Array:
-        """Values of the searched parameters, (n_parameters,)."""
-        return np.array(
-            [self.case.parameters[name] for name in self.case.experiment.searched.names]
-        )
 
     def told(self, train: Train) -> tuple[Array, float]:
         """Return relative bounds under a train, (n_parameters,), and the jaws' least force.
@@ -316,13 +311,13 @@ def _specimen(case: Case, block: DesignBlock, limits: Limits) -> Specimen:
     noise = float(standard_deviation(read[0], case.noise)[0])
     elapsed_s = limits.elapsed_s
     step = join_phases((hold(elapsed_s[-1], 1.0),), deforms=case.instrument.deforms)
-    values = np.array([[case.parameters[name] for name in model.names]])
-    unit = linear_responses(problem.gripper, model, step, elapsed_s, values)[0, 1:]
+    values = np.array([case.parameters[name] for name in model.names])
+    unit = linear_responses(problem.gripper, model, step, elapsed_s, values[None])[0, 1:]
     if case.instrument.has_jaws:
         pressing = step_response(case.gripper, network, inertia=False, force=True)
         unit = np.vstack((unit, linear_jaw_force(pressing, step, elapsed_s)))
     read_s = elapsed_s[0 if case.instrument.has_jaws else 2 :: 2]
-    return Specimen(case, noise, required, problem.nuisance(read_s), unit)
+    return Specimen(case, values, noise, required, problem.nuisance(read_s), unit)
 
 
 def search(

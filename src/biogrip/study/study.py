@@ -302,11 +302,6 @@ class Study:
         return self._where(lambda case: not case.recorded and case.instrument.has_jaws)
 
     @property
-    def has_gripper(self) -> bool:
-        """True if the gripper holds the sample of any case."""
-        return any(case.instrument.has_jaws for case in self.cases.values())
-
-    @property
     def covered(self) -> list[str]:
         """Names of cases whose intervals are tested for coverage."""
         return self._where(lambda case: case.coverage_seeds > 0)
