@@ -320,17 +320,7 @@ def test_advice_is_given_of_a_rejected_fit_alone() -> None:
     assert f"{EXAMPLE}: rejected: It is wrong." in lines
 
 
-def test_colours_are_not_for_all_terminals(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert "\x1b" not in example()[0]
-    monkeypatch.setattr(sys.stdout, "isatty", lambda: True, raising=False)
-    monkeypatch.setenv("NO_COLOR", "1")
-    assert "\x1b" not in in_columns([example()[1]], {})
-
-
-def test_a_terminal_sees_every_phase_and_colours(
-    tmp_path: Path, few: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.delenv("NO_COLOR", raising=False)
+def test_a_terminal_sees_every_phase(tmp_path: Path, few: Path) -> None:
     shown: list[bytes] = []
 
     def read(screen: int) -> bytes:
@@ -344,8 +334,6 @@ def test_a_terminal_sees_every_phase_and_colours(
         assert phase in said
     # The line of the phases is gone before anything is told.
     assert "\r\x1b[K" in said.split(str(EXAMPLE))[-2]
-    assert "\x1b[32mdetermined: " in said
-    assert "\x1b[33monly bounded above" in said
 
 
 def test_only_what_can_be_published_is_said_for_a_paper() -> None:

@@ -1,8 +1,6 @@
 """Results of identification in words: for a terminal, and what a paper says of the methods."""
 
-import os
 import re
-import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import log
 from textwrap import indent
@@ -11,26 +9,12 @@ from typing import Any
 from biogrip import __version__
 from biogrip.digits import counted, instant, legible, plain, with_limits, with_unit, within_limits
 from biogrip.judging.doubts import DOUBT, DOUBTFUL, HARMLESS, OK, REJECTED, REJECTION
-from biogrip.judging.verdicts import (
-    BOUNDED_ABOVE,
-    BOUNDED_BELOW,
-    DETERMINED,
-    FIT_REJECTED,
-    NOT_DETERMINED,
-)
+from biogrip.judging.verdicts import FIT_REJECTED, NOT_DETERMINED
 from biogrip.judging.without_model import BEYOND, EXPONENT, FLOW, LEVEL, LOSS
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.models import CANDIDATES
 from biogrip.study.measurement_block import KNOWN_NOISE
 from biogrip.terminal import aligned, visible, visible_lines
-
-_COLOURS = {
-    DETERMINED: 32,
-    BOUNDED_ABOVE: 33,
-    BOUNDED_BELOW: 33,
-    NOT_DETERMINED: 31,
-    FIT_REJECTED: 90,
-}
 
 # Instrument whose readings span decades: their misfit is told over their noise.
 _SWEEPS = "oscillation"
@@ -58,10 +42,7 @@ def in_words(found: Mapping[str, Any]) -> str:
         misfit_in_words(found),
         *(without_model_in_words(found) if rejected else []),
         f"{found['model_title']}, {100 * found['confidence']:g} % limits:",
-        *(
-            f"  {item['quantity']:<{width}}  {_coloured(item['in_words'], item['verdict'])}"
-            for item in found["quantities"]
-        ),
+        *(f"  {item['quantity']:<{width}}  {item['in_words']}" for item in found["quantities"]),
     ]
     lines += [] if rejected else without_model_in_words(found)
     lines += one_sided_in_words([found], foremost(found))
@@ -218,10 +199,7 @@ def in_columns(found: Sequence[Mapping[str, Any]], refused: Mapping[str, str]) -
         columns = columns_of(found)
         rows = []
         for each in found:
-            cells = {
-                q["quantity"]: _coloured(limits_in_short(q), q["verdict"])
-                for q in each["quantities"]
-            }
+            cells = {q["quantity"]: limits_in_short(q) for q in each["quantities"]}
             own = (cells.get(label, "") for label in columns)
             rows.append([visible(each["trace"]), each["fit"], *own])
         lines.append(aligned(rows, ["trace", "fit", *columns.values()]))
@@ -314,13 +292,6 @@ def limits_in_short(quantity: Mapping[str, Any]) -> str:
     if low is not None:
         return f"≥ {plain(low, 2)}"
     return "?" if high is None else f"≤ {plain(high, 2)}"
-
-
-def _coloured(text: str, verdict: str) -> str:
-    """Colour a verdict if standard output is a terminal (https://no-color.org)."""
-    if not sys.stdout.isatty() or os.environ.get("NO_COLOR"):
-        return text
-    return f"\x1b[{_COLOURS[verdict]}m{text}\x1b[0m"
 
 
 REFERENCE = (

@@ -19,12 +19,7 @@ from biogrip.physics.noise import within
 from biogrip.physics.protocol import is_storage
 from biogrip.physics.simulation import jaw_force, simulated_response
 from biogrip.physics.unilateral import UnilateralResponse, unilateral_response
-from biogrip.records.identifications import (
-    ALL,
-    basins,
-    read_identifications,
-    read_verdicts,
-)
+from biogrip.records.identifications import ALL, basins, read_identifications, read_verdicts
 from biogrip.records.rows import seeds_of
 from biogrip.records.traces import Measurements, read_measurements, read_target
 from biogrip.stages.identification import TRACE, experiment_for

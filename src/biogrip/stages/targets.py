@@ -20,12 +20,7 @@ from biogrip.physics.protocol import evaluate, sample_times
 from biogrip.physics.simulation import compute_grip, jaw_force, simulated_response
 from biogrip.physics.unilateral import unilateral_response
 from biogrip.records.rows import write_arrays
-from biogrip.records.traces import (
-    Measurements,
-    read_target,
-    write_measurements,
-    write_target,
-)
+from biogrip.records.traces import Measurements, read_target, write_measurements, write_target
 from biogrip.study.study import Case
 from biogrip.terminal import warn
 from biogrip.traces.columns import place
