@@ -342,9 +342,8 @@ def identify_sample(
         Seed of the starts.
     """
     problem = experiment.of(as_column(time_s, "time_s"), as_column(readings, "readings"))
-    return identify_many(
-        [problem], experiment.least_squares, [np.random.default_rng(seed)], silent
-    )[0]
+    rngs = [np.random.default_rng(seed)]
+    return identify_many([problem], experiment.least_squares, rngs, silent)[0]
 
 
 @one_blas_thread

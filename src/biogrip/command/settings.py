@@ -456,12 +456,11 @@ def read_table(
         )
     options_of = {name: _plain(name) for name in header if _plain(name) in OPTIONS}
     problems = list(_column_problems(path, header, rows, {file, *options_of}))
+    used = {"", *options_of, *(name for name in header if "." in name)}
+    kept = [(line, row) for line, row in rows if any(row)]
     found: list[Asked] = []
-    lines: list[int] = []
     set_by: list[dict[str, str]] = []
-    for line, row in rows:
-        if not any(row):
-            continue
+    for line, row in kept:
         if any(row[len(header) :]):
             text = f"found {counted(len(row), 'cell')} in the row, allowed are the header's"
             problems.append(f"{place(path, line)}: {text} {len(header)}.")
@@ -470,23 +469,19 @@ def read_table(
         if trace == path.parent:
             problems.append(f"{place(path, line, file)}: found nothing, allowed is a trace.")
         settings = list(options)
-        for name, cell in by_name.items():
-            if ("." in name or name in options_of) and cell:
-                try:
-                    settings += _settings_of(
-                        cell, name, options_of.get(name), place(path, line, name)
-                    )
-                except (BiogripError, ValueError) as error:
-                    problems.append(f"{place(path, line, name)}: {error}")
-        used = {"", *options_of, *(name for name in by_name if "." in name)}
+        set_by.append({name: cell for name, cell in by_name.items() if name in used})
+        for name, cell in set_by[-1].items():
+            where = place(path, line, name)
+            try:
+                settings += _settings_of(cell, name, options_of.get(name), where)
+            except (BiogripError, ValueError) as error:
+                problems.append(f"{where}: {error}")
         copied = {name: cell for name, cell in by_name.items() if name not in used}
         found.append(Asked(trace, config, tuple(settings), place(path, line), copied))
-        set_by.append({name: cell for name, cell in by_name.items() if name in used})
-        lines.append(line)
     if not found:
         problems.append(f"{place(path)}: found no traces, allowed is a row for each.")
     parts, before = _parts([own.trace for own in found], set_by), dict[tuple[str, str], int]()
-    for index, (own, line, part) in enumerate(zip(found, lines, parts, strict=True)):
+    for index, (own, (line, _), part) in enumerate(zip(found, kept, parts, strict=True)):
         first = before.setdefault((os.path.realpath(own.trace), part), line)
         if first != line and own.trace != path.parent:
             text = f"found '{visible(own.trace)}' again, as on line {first}; allowed is each"
@@ -513,6 +508,8 @@ def _parts(traces: Sequence[Path], set_by: Sequence[Mapping[str, str]]) -> list[
 
 def _settings_of(cell: str, name: str, option: str | None, by: str) -> Iterator[Setting]:
     """Yield what a cell sets, in a column named after an option, or after a key with dots."""
+    if not (name and cell):
+        return
     key = name if option is None else OPTIONS[option]
     if isinstance(key, str):
         yield Setting(by, tuple(key.split(".")), value_of(cell, name))

@@ -196,8 +196,7 @@ def draw_scatter(
     case: Case, identifications: Path, target: Path, expected: Path, calibrated: list[Path]
 ) -> Figure:
     """Draw identified over target for every quantity and method."""
-    items = read_verdicts(expected)["quantities"]
-    verdicts = {item["quantity"]: item["verdict"] for item in items}
+    verdicts = {it["quantity"]: it["verdict"] for it in read_verdicts(expected)["quantities"]}
     found = read_identifications(identifications, case)
     bounds = bounds_at_truth(case, target, calibrated)
     drawn, grid = style.row_of_panels(len(bounds), 3.1)

@@ -15,7 +15,7 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from biogrip.arrays import Array, BoolArray
+from biogrip.arrays import Array
 from biogrip.digits import with_unit
 from biogrip.figures import style
 from biogrip.figures.fit import (
@@ -242,12 +242,13 @@ def _moduli(axes: Axes, study: Study, case: Case, identified: Path, time_s: Arra
     # In the upper half and, hatched, in the lower one.
     for part, above, name in ((fitting.real, 0.5, "storage"), (fitting.imag, 0.0, "loss")):
         ends: dict[str, Any] = {"ymin": above, "ymax": above + 0.5, "linewidth": 0, "zorder": 0}
-        ends |= (
-            {"color": style.SHADE}
-            if above
-            else {"fill": False, "edgecolor": style.SHADE, "hatch": "////"}
-        )
-        shown = np.flatnonzero(_agreed(part)) if len(part) else np.array([], dtype=np.int64)
+        hatched = {"fill": False, "edgecolor": style.SHADE, "hatch": "////"}
+        ends |= {"color": style.SHADE} if above else hatched
+        shown = np.array([], dtype=np.int64)
+        if len(part):
+            # Where nine tenths of the fits agree.
+            least, most = np.quantile(part, (0.05, 0.95), axis=0)
+            shown = np.flatnonzero(most < (1 + NEAR) * least)
         for run in np.split(shown, np.flatnonzero(np.diff(shown) > 1) + 1) if len(shown) else []:
             label = f"{name} seen" if run[0] == shown[0] else None
             axes.axvspan(omega[run[0]], omega[run[-1]], label=label, **ends)
@@ -279,12 +280,6 @@ def _modulus(network: Network, omega: Array) -> Array:
     """Return complex moduli of n samples, in N/m or Pa, (n, n_omega)."""
     storage, loss = complex_modulus(network, omega)
     return storage + 1j * loss
-
-
-def _agreed(moduli: Array) -> BoolArray:
-    """Return True at frequencies where nine tenths of fits, (n, n_omega), agree on a modulus."""
-    low, high = np.quantile(moduli, (0.05, 0.95), axis=0)
-    return high < (1 + NEAR) * low
 
 
 _CELL_IN = 0.24

@@ -146,6 +146,8 @@ def write_report(
     own = [it for case, it in found if case.recorded and not study.published]
     asked = compared, study.shown_method.title
     who = "Run again, the paper's" if study.published else "The"
+    every = [*titles.values()]
+    named = ", ".join(every) if len(every) <= _MOST_TITLES else f"{len(every)} samples"
     shown = {
         "sliders": slid(*movable[0]) if movable else None,
         "answers": [
@@ -170,7 +172,7 @@ def write_report(
         "evidence_tables": [it for it in tables if it.name in _EVIDENCE],
         "tables": [it for it in tables if it.name not in _EVIDENCE],
         "config": config,
-        "title": _title(study),
+        "title": _QUESTION if study.published else named,
         "paper": bool(study.published),
         "versions": {"biogrip": __version__, **{name: version(name) for name in _LIBRARIES}},
     }
@@ -186,13 +188,6 @@ def write_summary(case: Case, verdicts: Path, figures: list[Path], page: Path) -
         figures=[(path.stem, data_url("image/png", path.read_bytes())) for path in figures],
     )
     write_text(page, text)
-
-
-def _title(study: Study) -> str:
-    """Return the paper's question, or the titles of the cases of another study."""
-    titles = [case.title for case in study.cases.values()]
-    named = ", ".join(titles) if len(titles) <= _MOST_TITLES else f"{len(titles)} samples"
-    return _QUESTION if study.published else named
 
 
 def _is_own(entry: Entry, study: Study) -> bool:

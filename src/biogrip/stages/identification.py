@@ -133,21 +133,13 @@ def fit(
     rows: dict[str, list[tuple[str | int, ...]]] = {name: [] for name in models}
     for group in groups(seeds):
         traces = experiment.of_each(recorded.time_s, [recorded.readings[seed] for seed in group])
-        found = fit_models(
-            {
-                name: [experiment.for_model(trace, model) for trace in traces]
-                for name, model in models.items()
-            },
-            case.block.least_squares,
-            {
-                name: [
-                    stream(case.study.config.study_seed, case.name, seed, f"model {name}")
-                    for seed in group
-                ]
-                for name in models
-            },
-            partial(progress.done, len(group)),
-        )
+        posed, rngs = {}, {}
+        for name, model in models.items():
+            posed[name] = [experiment.for_model(trace, model) for trace in traces]
+            whose = case.study.config.study_seed, case.name
+            rngs[name] = [stream(*whose, seed, f"model {name}") for seed in group]
+        done = partial(progress.done, len(group))
+        found = fit_models(posed, case.block.least_squares, rngs, done)
         for name, answers in found.items():
             sizes = len(models[name].names), len(recorded.time_s)
             rows[name] += [

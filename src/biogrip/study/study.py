@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
@@ -55,7 +55,7 @@ class Case:
     @cached_property
     def plain(self) -> dict[str, Any]:
         """Config block as plain values, without keys that have their default."""
-        return cast("dict[str, Any]", plain(self.block))
+        return plain(self.block)
 
     @property
     def title(self) -> str:
@@ -260,7 +260,7 @@ class Study:
     @cached_property
     def plain(self) -> dict[str, Any]:
         """Config as plain values, without keys that have their default."""
-        return cast("dict[str, Any]", plain(self.config))
+        return plain(self.config)
 
     @cached_property
     def cases(self) -> dict[str, Case]:
