@@ -404,6 +404,6 @@ if __name__ == "__main__":
         write(contacts(study_held), Path(snakemake.output.contact))
         write(left_out(study_held), Path(snakemake.output.left_out))
         if study_held.gripped:
-            of_gripped, of_loss = map(Path, snakemake.output.gripped[:2])
+            of_gripped, of_loss = map(Path, snakemake.output.gripped)
             write(mechanics(study_held.of(study_held.gripped)), of_gripped)
             write(contact_loss(study_held), of_loss)

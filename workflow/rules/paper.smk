@@ -5,6 +5,7 @@ from biogrip.physics.models import SINGLE_BRANCH
 # Simulated cases whose model has the paper's parameters, and what is read of each.
 OURS = {parameter.name for parameter in SINGLE_BRANCH}
 GRIPPED = STUDY.of(STUDY.gripped)
+OF_GRIPPED = ["mechanics", "contact_loss"] if STUDY.gripped else []
 READ = [n for n in STUDY.published if set(STUDY.case(n).sample.model.names) <= OURS]
 
 
@@ -43,13 +44,8 @@ rule mechanics:
     output:
         contact="results/tables/contact.csv",
         left_out="results/tables/left_out.csv",
-        pages=[page_of_table(name) for name in ("contact", "left_out")],
-        gripped=(
-            ["results/tables/mechanics.csv", "results/tables/contact_loss.csv"]
-            + [page_of_table(name) for name in ("mechanics", "contact_loss")]
-            if STUDY.gripped
-            else []
-        ),
+        gripped=expand("results/tables/{name}.csv", name=OF_GRIPPED),
+        pages=[page_of_table(name) for name in ("contact", "left_out", *OF_GRIPPED)],
     log:
         "results/logs/mechanics.log",
     benchmark:
