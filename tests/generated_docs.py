@@ -233,7 +233,7 @@ def slow_branch() -> str:
     slow = study_of(f"cases: {{liquid_drop_1: {{fixed: {{c: {_SLOW}}}}}}}").case(case.name)
     time_s, seeds = case.times_s, range(case.seeds)
     (target,) = simulated_response(case.gripper, case.network, case.torque, time_s, nonlinear=False)
-    rngs = [stream(STUDY.study_seed, case.name, seed, "noise") for seed in seeds]
+    rngs = [stream(STUDY.config.study_seed, case.name, seed, "noise") for seed in seeds]
     traces = [add_noise(target, case.noise, rng, time_s) for rng in rngs]
     identify = identifier("least_squares", case.block.least_squares)
     posed = (each.experiment.to_identify().of_each(time_s, traces) for each in (case, slow))

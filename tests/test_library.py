@@ -10,7 +10,8 @@ import yaml
 
 import biogrip
 from biogrip import library
-from biogrip.command.settings import Asked, Setting, case_of
+from biogrip.command.options import Setting
+from biogrip.command.settings import Asked, case_of
 from tests.helpers.default import STUDY
 from tests.helpers.identified import identified, told
 from tests.helpers.places import EXAMPLE, ROOT
@@ -189,6 +190,5 @@ def test_all_of_the_library_can_be_had_from_the_package_and_is_as_the_default_st
     assert all(getattr(biogrip, name) is getattr(library, name) for name in library.__all__)
     with pytest.raises(AttributeError, match="has no attribute 'nonsense'"):
         _ = biogrip.nonsense
-    assert STUDY.ranges == library._RANGES
     budgets = [case.block.least_squares for case in STUDY.cases.values()]
     assert all(budget == CREEP.least_squares for budget in budgets)

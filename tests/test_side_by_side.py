@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from biogrip.command.side_by_side import side_by_side
+from biogrip.command.files import side_by_side
 
 
 def test_results_come_in_order_and_of_what_was_killed_none() -> None:

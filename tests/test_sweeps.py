@@ -12,7 +12,7 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.cli import _parser
-from biogrip.command.settings import Asked, Setting, read_trace
+from biogrip.command.settings import Asked, read_trace
 from biogrip.command.words import set_up_in_words
 from biogrip.errors import BiogripError
 from biogrip.fit.any_sample import swept_deviations
@@ -207,7 +207,7 @@ def test_files_of_instruments_tell_the_same(tmp_path: Path, name: str) -> None:
     trace.write_text(f"{head}\n{text}\n", encoding="utf-8")
     options = [option for each in readings for option in ("--reading", each)]
     given = _parser().parse_args(["identify", "a", "--frequency", frequency, *options]).settings
-    recording, _ = read_trace(Asked(trace, None, tuple(Setting(*each) for each in given)))
+    recording, _ = read_trace(Asked(trace, None, tuple(given)))
     loss, storage = np.split(recording.readings, 2)
     np.testing.assert_allclose(recording.time_s, np.append(-OMEGA[::-1], OMEGA), rtol=1e-8)
     np.testing.assert_allclose([storage, loss[::-1]], values, rtol=3e-8)

@@ -8,12 +8,13 @@ from tests.helpers.places import ROOT
 
 OPTIONS = """
 import sys
-from biogrip.cli import _SETTINGS, _parser
+from biogrip.cli import _parser
+from biogrip.command.options import GROUPS
 
 VALUES = {"--hold": "5", "--set": "measurement.block=2", "--fix": "k_p=0"}
 VALUES |= {"--start": "1.5", "--at": "1,10"}
 parser = _parser()
-for name, metavar, _ in (option for options in _SETTINGS.values() for option in options):
+for name, metavar, *_ in (option for options in GROUPS.values() for option in options):
     given = [name, VALUES.get(name, "a")] if metavar else [name]
     parser.parse_args(["identify", "trace.csv", *given])
     assert "numpy" not in sys.modules, name

@@ -11,9 +11,10 @@ import pytest
 
 from biogrip.command import files as command
 from biogrip.command.files import identify_batch
+from biogrip.command.options import Setting
 from biogrip.command.outputs import Outcome
 from biogrip.command.page import beyond, common, draw_traces, write_page
-from biogrip.command.settings import Asked, Setting
+from biogrip.command.settings import Asked
 from biogrip.command.words import columns_of, for_a_paper
 from tests.helpers.identified import write_drop
 from tests.helpers.places import EXAMPLE
@@ -72,7 +73,7 @@ def test_a_page_begins_with_status_value_and_interval(example: Outcome, tmp_path
     assert r"95\,\%" not in unfolded
     lines = for_a_paper(example.found[0])
     assert len(lines) == sum(f"<p>{line}</p>" in text for line, _ in lines) == 6
-    assert r"$k_{p} = 5.01\,\mathrm{N/m}$ (95\,\% profile-likelihood interval $" in text
+    assert r"$k_{p}$ = 5.01 N/m (95 \% profile-likelihood interval " in text
 
 
 def test_pictures_are_small_and_in_the_page(page: Path) -> None:

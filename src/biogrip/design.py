@@ -93,6 +93,8 @@ class Specimen:
     """The sample of a case, and how it answers a unit step."""
 
     case: Case
+    parameters: Array
+    """Values of the searched parameters, (n_parameters,)."""
     noise: float
     """Standard deviation of the noise, in the SI unit of what is read."""
     required: BoolArray
@@ -104,13 +106,6 @@ class Specimen:
     unit: Array
     """After a unit step, derivatives of what is read by the log-parameters, and the force of the
     jaws if there are any, at `Limits.elapsed_s`, (n_parameters + 1 or 0, n_times)."""
-
-    @property
-    def parameters(self) -> Array:
-        """Values of the searched parameters, (n_parameters,)."""
-        return np.array(
-            [self.case.parameters[name] for name in self.case.experiment.searched.names]
-        )
 
     def told(self, train: Train) -> tuple[Array, float]:
         """Return relative bounds under a train, (n_parameters,), and the jaws' least force.
@@ -155,7 +150,7 @@ class Experiment:
 
 
 def design(
-    config: Path, output: Path | None, within: tuple[str | None, float] | None = None
+    config: Path, output: Path | None = None, within: tuple[str | None, float] | None = None
 ) -> None:
     """Search for a train of steps, print what it tells, and write a config that runs it.
 
@@ -281,11 +276,10 @@ def set_up(
     duration_s = block.duration_s or min(case.experiment.torque.end_s for case in cases)
     intervals = int(duration_s * rate_Hz * (1 + 1e-12))
     if not _FEWEST <= intervals <= _MOST:
-        text = f"design.duration_s: found {duration_s:g} s, room for {intervals} readings at "
-        text += (
-            f"{rate_Hz:g} Hz; allowed are {_FEWEST} to {_MOST}, by another duration_s or rate_Hz"
+        raise BiogripError(
+            f"design.duration_s: found {duration_s:g} s, room for {intervals} readings at "
+            f"{rate_Hz:g} Hz; allowed are {_FEWEST} to {_MOST}, by another duration_s or rate_Hz."
         )
-        raise BiogripError(f"{text}.")
     limits = Limits(min(block.steps, intervals // _FEWEST), largest, rate_Hz, intervals)
     return limits, [_specimen(case, block, limits) for case in cases]
 
@@ -317,13 +311,13 @@ def _specimen(case: Case, block: DesignBlock, limits: Limits) -> Specimen:
     noise = float(standard_deviation(read[0], case.noise)[0])
     elapsed_s = limits.elapsed_s
     step = join_phases((hold(elapsed_s[-1], 1.0),), deforms=case.instrument.deforms)
-    values = np.array([[case.parameters[name] for name in model.names]])
-    unit = linear_responses(problem.gripper, model, step, elapsed_s, values)[0, 1:]
+    values = np.array([case.parameters[name] for name in model.names])
+    unit = linear_responses(problem.gripper, model, step, elapsed_s, values[None])[0, 1:]
     if case.instrument.has_jaws:
         pressing = step_response(case.gripper, network, inertia=False, force=True)
         unit = np.vstack((unit, linear_jaw_force(pressing, step, elapsed_s)))
     read_s = elapsed_s[0 if case.instrument.has_jaws else 2 :: 2]
-    return Specimen(case, noise, required, problem.nuisance(read_s), unit)
+    return Specimen(case, values, noise, required, problem.nuisance(read_s), unit)
 
 
 def search(
@@ -444,7 +438,8 @@ def _said(
         name, instrument = one.case.name, one.case.instrument
         controlled, read = instrument.controlled, instrument.read
         for index, parameter in enumerate(one.case.experiment.searched.names):
-            percents = (_percent(each.bounds[index]) for each in both)
+            bounds = (each.bounds[index] for each in both)
+            percents = (f"{100 * it:.3g}" if it < NO_BOUND else "none" for it in bounds)
             rows.append((name, f"{parameter}: bound (%)", *percents))
             if one.required[index] and not within[index]:
                 notes.append(f"No protocol that was tried determines {parameter} of {name}.")
@@ -465,10 +460,6 @@ def _said(
         "A bound is the least standard deviation (Cramér-Rao) in percent of the value, with all "
         "parameters unknown that are not fixed. The noise is white, and the same under both."
     )
-
-
-def _percent(bound: float) -> str:
-    return f"{100 * bound:.3g}" if bound < NO_BOUND else "none"
 
 
 def _rounded(value: float) -> float:

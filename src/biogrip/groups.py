@@ -3,11 +3,9 @@
 `biogrip.judging.cells` has the statistics.
 """
 
-import csv
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from io import StringIO
 from math import inf, isnan, nan
 from pathlib import Path
 from textwrap import fill
@@ -58,7 +56,11 @@ _WIDTH = 100
 
 
 def groups(
-    found: Path, by: str, table: Path | None, unit: str | None = None, plot: Path | None = None
+    found: Path,
+    by: str,
+    table: Path | None = None,
+    unit: str | None = None,
+    plot: Path | None = None,
 ) -> None:
     """Compare groups of cells, print the comparison, write it as CSV and draw it if asked.
 
@@ -71,7 +73,6 @@ def groups(
     if unit == by:
         raise BiogripError("--unit: found the column of --by; allowed is another, as of dishes.")
     header, *rows = read_rows(found)
-    _require_end(found)
     units = _units(header)
     columns = [column for item in units.items() for column in _columns(*item).values()]
     made_by = [by] if unit is None else [by, unit]
@@ -139,15 +140,6 @@ def groups(
         _draw(cells, compared, units, plot)
     if said := [visible(path) for path in (table, plot) if path]:
         print(f"Written to {', '.join(said)}.")
-
-
-def _require_end(found: Path) -> None:
-    """Refuse a table that was cut: some programs write no last end of a line, but all its cells."""
-    text = found.read_bytes().decode()
-    lines = [*csv.reader(StringIO(text, newline=""))]
-    if text[-1] not in "\r\n" and len(lines[-1]) < len(lines[0]):
-        problem = f"found {len(lines[-1])} cells in the last row, of {len(lines[0])}"
-        raise BiogripError(f"{visible(found)}: {problem}; allowed is a table that is whole.")
 
 
 def _draw(cells: Sequence[Cell], compared: Compared, units: Mapping[str, str], plot: Path) -> None:

@@ -14,19 +14,18 @@ from functools import cache
 from typing import Annotated, Any, ClassVar, Self, TypeVar
 
 from pydantic import (
+    AfterValidator,
     BaseModel,
     ConfigDict,
     Discriminator,
     Field,
     GetCoreSchemaHandler,
-    GetJsonSchemaHandler,
     TypeAdapter,
     ValidationInfo,
     model_validator,
 )
-from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError, ValidationError
-from pydantic_core.core_schema import literal_schema, no_info_after_validator_function
+from pydantic_core.core_schema import literal_schema
 
 T = TypeVar("T")
 
@@ -112,24 +111,16 @@ class OneOf:
         return literal_schema(list(self.names))
 
 
-class Distinct:
-    """Annotation of a list whose items must differ."""
-
-    def __get_pydantic_core_schema__(self, kind: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Check with pydantic that no item is there twice."""
-        return no_info_after_validator_function(_without_twins, handler(kind))
-
-    def __get_pydantic_json_schema__(
-        self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
-        """Say so in the JSON Schema."""
-        return handler(schema) | {"uniqueItems": True}
-
-
 def _without_twins(items: tuple[Any, ...]) -> tuple[Any, ...]:
     if any(item in items[:index] for index, item in enumerate(items)):
         raise PydanticCustomError(TWICE, "something is there twice")
     return items
+
+
+Distinct = Annotated[
+    T, AfterValidator(_without_twins), Field(json_schema_extra={"uniqueItems": True})
+]
+"""A list whose items must differ; its bounds stand within the brackets."""
 
 
 @cache

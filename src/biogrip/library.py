@@ -15,8 +15,9 @@ from threadpoolctl import threadpool_limits
 
 from biogrip.arrays import Array, as_column
 from biogrip.command.files import data_of
+from biogrip.command.options import Setting
 from biogrip.command.outputs import Outcome, table_of
-from biogrip.command.settings import MODEL, Asked, Setting, read_trace
+from biogrip.command.settings import MODEL, Asked, read_trace
 from biogrip.command.words import in_words
 from biogrip.errors import BiogripError
 from biogrip.fit.experiment import Experiment
@@ -32,6 +33,7 @@ from biogrip.physics.noise import Noise, add_noise
 from biogrip.physics.protocol import Phase, hold
 from biogrip.physics.simulation import simulated_response
 from biogrip.study.source import HOLD
+from biogrip.study.study import default_ranges
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -259,16 +261,6 @@ def to_table(
     return pd.DataFrame(rows, columns=header)
 
 
-# Ranges of the default study.
-_RANGES = {
-    "k": GeneRange((-3, 8), (1, 9)),
-    "k_p": GeneRange((-3, 8), (1, 9)),
-    "c": GeneRange((-4, 5), (1, 9)),
-    "c_p": GeneRange((-4, 5), (1, 9)),
-    "alpha": GeneRange((-1, 0), (1, 9)),
-}
-
-
 def set_up(
     gripper: Gripper | Instrument,
     protocol: tuple[Phase, ...],
@@ -297,7 +289,7 @@ def set_up(
     return Experiment(
         NO_ARMS if isinstance(gripper, Instrument) else gripper,
         protocol,
-        ranges or _RANGES,
+        ranges or default_ranges(),
         replace(sample, stiffness=instrument.stiffness),
         dict(fixed or {}),
         instrument,
@@ -350,9 +342,8 @@ def identify_sample(
         Seed of the starts.
     """
     problem = experiment.of(as_column(time_s, "time_s"), as_column(readings, "readings"))
-    return identify_many(
-        [problem], experiment.least_squares, [np.random.default_rng(seed)], silent
-    )[0]
+    rngs = [np.random.default_rng(seed)]
+    return identify_many([problem], experiment.least_squares, rngs, silent)[0]
 
 
 @one_blas_thread
@@ -385,12 +376,10 @@ def plot(experiment: Experiment, time_s: ArrayLike, readings: ArrayLike, found: 
     """Draw a trace, its fit and the residuals."""
     from biogrip.figures.fit import draw_fit, fit_of
     from biogrip.figures.style import styled
-    from biogrip.records.traces import Measurements
 
-    names = experiment.searched.names
-    values = {**experiment.fixed, **dict(zip(names, map(float, found.parameters), strict=True))}
-    times, read = as_column(time_s, "time_s"), as_column(readings, "readings")
-    fit = fit_of(experiment, values, Measurements(times, None, {0: read}), 0)
+    values = dict(zip(experiment.searched.names, map(float, found.parameters), strict=True))
+    trace = as_column(time_s, "time_s"), as_column(readings, "readings")
+    fit = fit_of(experiment, values, *trace)
     with styled():
         return draw_fit({"best fit": fit}, "")
 

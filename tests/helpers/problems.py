@@ -21,6 +21,7 @@ from tests.helpers.default import STUDY
 
 MODEL = MODELS["generalized_maxwell"]
 SAMPLES = {name: case.parameters for name, case in STUDY.cases.items()}
+RANGES = vars(STUDY.config.search_range)
 EXPERIMENT = STUDY.cases["liquid_drop_2"].experiment
 GRIPPER, TORQUE = EXPERIMENT.gripper, EXPERIMENT.torque
 
@@ -41,7 +42,7 @@ def clean(case: str, rate_Hz: float = 1.0) -> tuple[Array, Array]:
 
 def posed_for(model: SampleModel, times: Array, trace: Array, **assumed: Any) -> TraceProblem:
     """The default study's problem for any model and trace; assumed is as `Experiment`'s."""
-    return replace(EXPERIMENT, ranges=STUDY.ranges, **assumed).of(times, trace, model)
+    return replace(EXPERIMENT, ranges=RANGES, **assumed).of(times, trace, model)
 
 
 def pose_noisy(
@@ -49,7 +50,7 @@ def pose_noisy(
 ) -> list[TraceProblem]:
     noise = Noise("gaussian", level, "peak")
     traces = [add_noise(trace, noise, np.random.default_rng([seed, 7])) for seed in range(n)]
-    return replace(EXPERIMENT, ranges=STUDY.ranges, **own).of_each(times, traces, model)
+    return replace(EXPERIMENT, ranges=RANGES, **own).of_each(times, traces, model)
 
 
 def problem(case: str, seed: int, level: float = 0.1, rate_Hz: float = 1.0) -> TraceProblem:

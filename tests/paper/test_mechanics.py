@@ -111,7 +111,7 @@ def test_distances_of_printed_values_are_shares_of_them() -> None:
     published = Published(table=9, identified={"k_p": 2.2}, error_percent={"k_p": "-340"})
     spring = seen(parameters={"k_p": 0.5, "c_p": 0.0}, published=published)
     ranges = {name: GeneRange((1, 1), (1, 9)) for name in ("k_p", "c_p")}
-    study = seen(cases={"spring": spring}, ranges=ranges)
+    study = seen(cases={"spring": spring}, config=seen(search_range=seen(**ranges)))
     target, identified = printed_values(study).rows
     assert (target["nearest_encodable"], target["within_range"]) == (1.1, "no")
     assert target["distance_percent"] == pytest.approx(-120)

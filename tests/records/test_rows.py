@@ -12,7 +12,7 @@ import pytest
 from biogrip.command.outputs import COLUMNS, join_tables
 from biogrip.errors import BiogripError
 from biogrip.physics.instruments import GRIPPER
-from biogrip.records.rows import as_it_was, escape_formula, read_frame, read_rows, write_rows
+from biogrip.records.rows import RowFile, as_it_was, escape_formula, read_rows, write_rows
 from biogrip.records.traces import (
     Measurements,
     read_measurements,
@@ -32,7 +32,7 @@ def test_no_cell_is_a_formula_and_all_are_read_back(tmp_path: Path, text: str) -
     with file.open(newline="") as stream:
         assert list(csv.reader(stream)) == [["name", "value"], [f"'{text}", "1"], ["b", "-2.5"]]
     assert read_rows(file) == [["name", "value"], *rows]
-    frame = read_frame(file, "rows", ("name", "value"), words=("name",))
+    frame = RowFile("rows", ("name", "value"), ("name",)).read(file)
     assert list(frame["name"]) == [text, "b"]
     assert list(frame["value"]) == [1.0, -2.5]
 
@@ -51,7 +51,7 @@ def test_ends_of_lines_are_within_quotes_and_what_is_no_text_is_written(tmp_path
 
 def test_what_cannot_be_read_is_said_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("a,b\n1,2,3\n")
-    with pytest.raises(BiogripError, match=r"a.csv: cannot be read: [^\n]* saw 3\.$"):
+    with pytest.raises(BiogripError, match=r"a.csv, line 2: part of the line is missing\.$"):
         read_rows(tmp_path / "a.csv")
 
 
@@ -59,7 +59,7 @@ def test_text_in_a_column_of_numbers_is_refused(tmp_path: Path) -> None:
     """In one, too, that not all files of its kind have."""
     write_rows(tmp_path / "a.csv", ("name", "value", "more"), [["a", 1, "1.0.5"]])
     with pytest.raises(BiogripError, match=r"a.csv: more: not all are numbers"):
-        read_frame(tmp_path / "a.csv", "rows", ("name", "value"), words=("name",))
+        RowFile("rows", ("name", "value"), ("name",)).read(tmp_path / "a.csv")
 
 
 def test_a_batch_that_lost_a_trace_is_named(tmp_path: Path) -> None:

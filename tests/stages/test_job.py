@@ -52,7 +52,7 @@ def test_all_keys_give_the_study_and_its_cases_back() -> None:
         for known in ("title", "sample", "noise", "experiment", "parameters", "seeds"):
             assert getattr(case, known) == getattr(was, known)
         np.testing.assert_array_equal(case.times_s, was.times_s)
-        assert case.study.study_seed == study.study_seed
+        assert case.study.config.study_seed == study.config.study_seed
         for method in study.config.methods:
             assert case.block.method(method) == was.block.method(method)
 

@@ -10,8 +10,8 @@ from biogrip.records.identifications import INTERVALS
 from biogrip.records.rows import read_rows, write_object
 from biogrip.stages import intervals as stage
 from biogrip.stages import targets
-from biogrip.tables.coverage import coverage, verdict_counts
 from biogrip.tables.layout import Column, ShownTable, compare, convert, write
+from biogrip.tables.study import coverage, verdict_counts
 from tests.helpers.default import study_of
 
 CASE = "liquid_drop_2"

@@ -11,7 +11,7 @@ from biogrip.physics.models import MODELS, Published, Sample
 from biogrip.records.identifications import ALL, MODEL_FITS, basins, columns, near_noise
 from biogrip.records.rows import write_object
 from biogrip.tables import cases
-from biogrip.tables.methods import methods, models
+from biogrip.tables.study import methods, models
 from tests.helpers.default import STUDY, seen, study_of
 
 FOUND = {"k": 9.0, "k_p": 1.0, "c": 3.0, "c_p": 2.0}
@@ -80,7 +80,7 @@ def test_joined_errors_are_within_the_tolerance_their_heading_names(eleven_seeds
 def study(parameters: dict[str, float], samples: int, *methods: str, seeds: int = 1) -> Any:
     known = {"sample": Sample("generalized_maxwell"), "parameters": parameters, "seeds": seeds}
     own, near = seen(config=seen(methods=methods)), {"near_noise_tolerance": 0.02}
-    drop = seen(name="drop", samples=samples, study=own, **known)
+    drop = seen(name="drop", times_s=range(samples), study=own, **known)
     return seen(cases={"drop": drop}, identifiers=METHODS, optimum_tolerance=1.0, **near)
 
 

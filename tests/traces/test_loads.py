@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.command.settings import Asked, Setting, case_of, load_in_words, read_trace
+from biogrip.command.options import Setting
+from biogrip.command.settings import Asked, case_of, load_in_words, read_trace
 from biogrip.errors import BiogripError
 from biogrip.identify.data import trace_data
 from biogrip.identify.identify import identify

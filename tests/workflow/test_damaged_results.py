@@ -11,8 +11,7 @@ import yaml
 from biogrip.errors import BiogripError
 from biogrip.records import identifications as found
 from biogrip.records.traces import read_measurements, read_target
-from biogrip.tables.coverage import read_intervals
-from biogrip.tables.methods import read_fits
+from biogrip.tables.study import read_fits, read_intervals
 from tests.helpers.default import study_of
 from tests.helpers.runs import TINY
 

@@ -14,20 +14,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 import yaml
+from scipy.stats import binom
 
+from biogrip.arrays import Array
 from biogrip.judging.verdicts import DETERMINED
 from biogrip.physics.calibration import ARM_KEYS, FreeMotion, calibrate, free_motion
 from biogrip.physics.noise import Noise, add_noise, stream
 from biogrip.physics.protocol import sample_times
 from biogrip.records.identifications import (
-    median_with_limits,
     near_noise,
     read_histories,
     read_identifications,
     read_readings,
     share_with_limits,
 )
-from biogrip.records.rows import read_frame
+from biogrip.records.rows import RowFile
 from biogrip.stages.job import job_study, logged, paths
 from biogrip.study.study import Case, Study
 from biogrip.tables.cases import value_in_case
@@ -93,6 +94,13 @@ def in_words(hits: int, runs: int) -> str:
     """Return a share in words, with its 95 % limits."""
     share, low, high = (100 * end for end in share_with_limits(hits, runs))
     return f"{share:.0f} % ({low:.0f} to {high:.0f} %) of {runs}"
+
+
+def median_with_limits(values: Array) -> tuple[float, float, float]:
+    """Return the median of values, (n,), and its 95 % interval from their order."""
+    ordered, count = np.sort(values), len(values)
+    first = max(int(binom.ppf(0.025, count, 0.5)) - 1, 0)
+    return float(np.median(values)), float(ordered[first]), float(ordered[count - 1 - first])
 
 
 class Evidence(Formatter):
@@ -198,7 +206,7 @@ def judge_free_arm(results: Results, evidence: str) -> list[Judged]:
     causes = test.step_torque_Nm, test.impulse_Nms
     motion = free_motion(arm, time_s, *causes)
     noise = Noise("gaussian", test.noise_level, "peak")
-    rng = stream(results.study.study_seed, "claims", 0, "calibration")
+    rng = stream(results.study.config.study_seed, "claims", 0, "calibration")
     step, impulse = (add_noise(each, noise, rng) for each in (motion.step, motion.impulse))
     found = calibrate(FreeMotion(time_s, step, impulse), *causes).arm
     errors = [100 * abs(getattr(found, key) / getattr(arm, key) - 1) for key in ARM_KEYS]
@@ -299,7 +307,7 @@ def read_results(
 
     Runs under readings of the paper are in files named like their case.
     """
-    tables = {file.stem: read_frame(file, "a table", ()) for file in files}
+    tables = {file.stem: RowFile("a table", words=None).read(file) for file in files}
     add_columns(tables)
     verdicts = [table for name, table in tables.items() if name.startswith("verdicts_")]
     tables["verdicts"] = pd.concat(verdicts, ignore_index=True)

@@ -119,11 +119,11 @@ _PRINTED_COLUMNS = (
 
 def printed_values(study: Study) -> ShownTable:
     """Compare published values with encoding, range and error formula."""
-    rows = []
+    rows, ranges = [], vars(study.config.search_range)
     for name_of_case, case in study.cases.items():
         printed = case.published
         for name, target in case.parameters.items():
-            genes, identified = study.ranges[name], printed.identified.get(name)
+            genes, identified = ranges[name], printed.identified.get(name)
             for quantity, value in (("target", target), ("identified", identified)):
                 if value is None or value <= 0:
                     continue

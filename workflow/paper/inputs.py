@@ -84,10 +84,10 @@ def actuator(study: Study) -> ShownTable:
 
 def gene_ranges(study: Study) -> ShownTable:
     """Table 3: values that the genes may take."""
-    rows = []
+    rows, ranges = [], vars(study.config.search_range)
     for name in (parameter.name for parameter in SINGLE_BRANCH):
         for index, role in enumerate(("exponent", "digit", "digit"), start=1):
-            low, high = getattr(study.ranges[name], role)
+            low, high = getattr(ranges[name], role)
             source = _source(study, f"search_range.{name}.{role}")
             gene = {"gene": f"g_{name}{index}", "parameter": name, "role": role, "source": source}
             rows.append(gene | {"min": low, "max": high, "values": high - low + 1})
@@ -97,9 +97,10 @@ def gene_ranges(study: Study) -> ShownTable:
 
 def parameter_ranges(study: Study) -> ShownTable:
     """Table 4: ranges of the parameters, as they follow from the genes."""
+    ranges = vars(study.config.search_range)
     rows = [
         {"parameter": p.name, "meaning": p.meaning, "unit": p.unit}
-        | {"min": study.ranges[p.name].low, "max": study.ranges[p.name].high}
+        | {"min": ranges[p.name].low, "max": ranges[p.name].high}
         for p in SINGLE_BRANCH
     ]
     caption = "Table 4. Ranges of the sample's parameters, computed from the genes of Table 3."

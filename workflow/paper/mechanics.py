@@ -320,7 +320,7 @@ _COLUMNS = (
 def contact_loss(study: Study) -> ShownTable:
     """Identify traces with bilateral and with unilateral contact, both linear; compare errors."""
     linear = [case for name in study.gripped if not (case := study.cases[name]).nonlinear_target]
-    rows = [row for case in linear for row in _loss_of(study.study_seed, case)]
+    rows = [row for case in linear for row in _loss_of(study.config.study_seed, case)]
     caption = (
         "Cases in which the jaws would have to pull: what least squares identifies, assuming "
         "bilateral contact, in traces with bilateral contact, in traces with loss of contact where "
@@ -411,6 +411,6 @@ if __name__ == "__main__":
         write(contacts(study_held), Path(snakemake.output.contact))
         write(left_out(study_held), Path(snakemake.output.left_out))
         if study_held.gripped:
-            of_gripped, of_loss = map(Path, snakemake.output.gripped[:2])
+            of_gripped, of_loss = map(Path, snakemake.output.gripped)
             write(mechanics(study_held.of(study_held.gripped)), of_gripped)
             write(contact_loss(study_held), of_loss)

@@ -99,7 +99,7 @@ def _rows(case: Case, found: pd.DataFrame) -> Iterator[Row]:
             "unit": members[0].unit,
             "target": truth,
             "lowest_force_uN": 1e6 * grip.lowest_N,
-            "readings": case.samples,
+            "readings": len(case.times_s),
             "noise_urad": 1e6 * noise,
             "bound_percent": bound,
             "seeds": len(errors),

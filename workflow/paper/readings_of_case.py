@@ -42,11 +42,11 @@ def _reading_rows(case: Case, target: Path) -> Iterator[tuple[str | int, ...]]:
         block = built(CaseBlock, overlaid(case.plain, reading.changes))
         read = replace(case, block=block)
         experiment, at, clean = read.experiment, time_s, rotation
-        if read.samples != len(time_s):
+        if len(read.times_s) != len(time_s):
             at, (clean, _) = read.times_s, response(read, read.times_s)
         for seeds in groups(range(case.seeds)):
             noises, searches = (
-                [stream(case.study.study_seed, case.name, seed, purpose) for seed in seeds]
+                [stream(case.study.config.study_seed, case.name, seed, purpose) for seed in seeds]
                 for purpose in ("noise", "genetic")
             )
             traces = [add_noise(clean, read.noise, rng, at) for rng in noises]

@@ -118,9 +118,10 @@ TABLES += ["models"] if SELECTING else []
 TABLES += ["verdict_counts"] if STUDY.counted else []
 # The search ranges of recorded traces follow from them.
 INPUTS = ["gene_ranges", "parameter_ranges"] if STUDY.simulated else []
-INPUTS += ["gripper", "actuator"] if STUDY.has_gripper else []
+HAS_GRIPPER = any(case.instrument.has_jaws for case in STUDY.cases.values())
+INPUTS += ["gripper", "actuator"] if HAS_GRIPPER else []
 EVIDENCE = ["evidence", "printed_values", "sampling_evidence"]
-OTHER_TABLES = [*INPUTS, *(["contact", "left_out"] if STUDY.has_gripper else [])]
+OTHER_TABLES = [*INPUTS, *(["contact", "left_out"] if HAS_GRIPPER else [])]
 OTHER_TABLES += ["linearisation", "mechanics", "contact_loss"] if STUDY.gripped else []
 OTHER_TABLES += ["claims", "tables_5_to_7", *EVIDENCE] if STUDY.published else []
 OTHER_TABLES += ["readings", "readings_found"] * bool(STUDY.config.readings)
@@ -130,7 +131,7 @@ OTHERS = [
     n for n in STUDY.gripped if n not in STUDY.published and STUDY.case(n).parameters in KNOWN
 ]
 OTHER_TABLES += ["protocols"] * bool(OTHERS)
-GRIPPER_FIGURES = ["comb", "linkage", "torque"] if STUDY.has_gripper else []
+GRIPPER_FIGURES = ["comb", "linkage", "torque"] if HAS_GRIPPER else []
 PAPER_FIGURES = ["protocols"] * bool(OTHERS)
 FIGURES = ["answer"] if ANSWERED else []
 FIGURES += ["moduli", "overview"] if STUDY.simulated else []

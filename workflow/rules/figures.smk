@@ -70,8 +70,6 @@ rule figures:
         **{name: drawing(name) for name in FIGURES},
     log:
         "results/logs/figures.log",
-    benchmark:
-        "results/benchmarks/figures.tsv"
     params:
         **settings_of(
             *"methods seeds evaluation actuator gripper protocol".split(),
@@ -101,8 +99,6 @@ rule page:
         front=shown("results/answers.html", "pages", "answers", ""),
     log:
         "results/logs/page.log",
-    benchmark:
-        "results/benchmarks/page.tsv"
     params:
         **settings_of(
             # All, for it shows the config.

@@ -39,7 +39,8 @@ rule sweep:
 
 if STUDY.config.traces:
     # Imported here, for it loads much that a study without a table needs not.
-    from biogrip.command.settings import Setting, check_settings, read_table
+    from biogrip.command.options import Setting
+    from biogrip.command.settings import check_settings, read_table
 
     MODEL = Setting("traces.model", ("sample", "model"), STUDY.config.traces.model)
     CONFIG = Path(STUDY.config.traces.config) if STUDY.config.traces.config else None

@@ -5,6 +5,7 @@ from biogrip.physics.models import SINGLE_BRANCH
 # Simulated cases whose model has the paper's parameters, and what is read of each.
 OURS = {parameter.name for parameter in SINGLE_BRANCH}
 GRIPPED = STUDY.of(STUDY.gripped)
+OF_GRIPPED = ["mechanics", "contact_loss"] if STUDY.gripped else []
 READ = [n for n in STUDY.published if set(STUDY.case(n).sample.model.names) <= OURS]
 
 
@@ -15,15 +16,9 @@ rule gripper_figures:
         linkage=drawing("linkage"),
     log:
         "results/logs/gripper_figures.log",
-    benchmark:
-        "results/benchmarks/gripper_figures.tsv"
     params:
         **settings_of(
-            *("gripper", "actuator", "protocol"),
-            *keys_of_cases(
-                STUDY,
-                *("gripper", *SAMPLE),
-            ),
+            *("gripper", "actuator", "protocol"), *keys_of_cases(STUDY, "gripper", *SAMPLE)
         ),
     message:
         "Drawing the gripper"
@@ -49,13 +44,8 @@ rule mechanics:
     output:
         contact="results/tables/contact.csv",
         left_out="results/tables/left_out.csv",
-        pages=[page_of_table(name) for name in ("contact", "left_out")],
-        gripped=(
-            ["results/tables/mechanics.csv", "results/tables/contact_loss.csv"]
-            + [page_of_table(name) for name in ("mechanics", "contact_loss")]
-            if STUDY.gripped
-            else []
-        ),
+        gripped=expand("results/tables/{name}.csv", name=OF_GRIPPED),
+        pages=[page_of_table(name) for name in ("contact", "left_out", *OF_GRIPPED)],
     log:
         "results/logs/mechanics.log",
     benchmark:
@@ -79,8 +69,6 @@ rule linearisation:
         figure=drawing("linearisation"),
     log:
         "results/logs/linearisation.log",
-    benchmark:
-        "results/benchmarks/linearisation.tsv"
     params:
         **settings_of("actuator", *keys_of_cases(GRIPPED, "gripper", "title", *SAMPLE)),
     message:
@@ -103,8 +91,6 @@ rule evidence:
         pages=[page_of_table(name) for name in EVIDENCE],
     log:
         "results/logs/evidence.log",
-    benchmark:
-        "results/benchmarks/evidence.tsv"
     params:
         **settings_of(
             *"methods seeds evaluation actuator gripper search_range".split(),
@@ -128,10 +114,8 @@ rule readings_of_case:
     resources:
         runtime=120,
     params:
-        **settings_of(
-            # Of the case all, for a reading may change any.
-            *("study_seed", "seeds", "actuator", "readings", *CASE_KEYS),
-        ),
+        # Of the case all, for a reading may change any.
+        **settings_of("study_seed", "seeds", "actuator", "readings", *CASE_KEYS),
     message:
         "Identifying {wildcards.case} under every reading of the paper"
     script:
@@ -148,10 +132,7 @@ rule readings:
     log:
         "results/logs/readings.log",
     params:
-        **settings_of(
-            *("readings", "seeds", "evaluation"),
-            *keys_of_cases(STUDY, *CASE_KEYS),
-        ),
+        **settings_of("readings", "seeds", "evaluation", *keys_of_cases(STUDY, *CASE_KEYS)),
     message:
         "Comparing the readings of the paper"
     script:
@@ -200,8 +181,6 @@ rule claims:
         pages=[page_of_table(name) for name in ("claims", "tables_5_to_7")],
     log:
         "results/logs/claims.log",
-    benchmark:
-        "results/benchmarks/claims.tsv"
     params:
         **settings_of(
             *"study_seed methods seeds evaluation actuator gripper readings".split(),

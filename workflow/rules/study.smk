@@ -10,10 +10,11 @@ rule target:
         case=names(SIMULATED),
     params:
         **settings_of("actuator", "gripper", "contact", "models", *SAMPLE, *SAMPLING),
+        stages=["targets.simulate"],
     message:
         "Simulating the response of {wildcards.case}"
     script:
-        "../scripts/target.py"
+        "../scripts/stage.py"
 
 
 # A recorded trace takes the place of target and measurement (rule `recording`).
@@ -28,10 +29,11 @@ rule measurement:
         case=names(SIMULATED),
     params:
         **settings_of("study_seed", "actuator", NOISE, *SAMPLE, *SAMPLING),
+        stages=["targets.measure"],
     message:
         "Adding noise to {wildcards.case}, {wildcards.batch}"
     script:
-        "../scripts/measurement.py"
+        "../scripts/stage.py"
 
 
 rule recording:
@@ -49,10 +51,11 @@ rule recording:
         recorded=lambda wildcards: {
             "recorded": digest_of(Path(STUDY.case(wildcards.case).block.measurement.file))
         },
+        stages=["targets.record"],
     message:
         "Reading the recorded trace of {wildcards.case}"
     script:
-        "../scripts/recording.py"
+        "../scripts/stage.py"
 
 
 rule calibration:
@@ -65,10 +68,11 @@ rule calibration:
         case=names(CALIBRATED),
     params:
         **settings_of("study_seed", "actuator", "gripper", "calibration", *SAMPLE),
+        stages=["targets.calibrate_gripper"],
     message:
         "Calibrating the gripper of {wildcards.case} without a sample"
     script:
-        "../scripts/calibration.py"
+        "../scripts/stage.py"
 
 
 rule identification:
@@ -87,10 +91,11 @@ rule identification:
     params:
         **settings_of("study_seed", "actuator", *FIT),
         method=lambda wildcards: settings(STUDY, METHODS[wildcards.method].blocks, wildcards.case),
+        stages=["identification.identify"],
     message:
         "Identifying {wildcards.case} by {wildcards.method}, {wildcards.batch}"
     script:
-        "../scripts/identification.py"
+        "../scripts/stage.py"
 
 
 rule judgement:
@@ -114,10 +119,11 @@ rule judgement:
             *("study_seed", "actuator", *FIT, *SAMPLING, NOISE),
             *("identifiability.confidence", "least_squares"),
         ),
+        stages=["identification.judge", "identification.expect"],
     message:
         "Computing confidence limits for the first trace of {wildcards.case}"
     script:
-        "../scripts/judgement.py"
+        "../scripts/stage.py"
 
 
 # Without a target nobody knows what to expect.
@@ -128,6 +134,7 @@ use rule judgement as recorded_judgement with:
         case=names(STUDY.recorded),
     params:
         **settings_of("measurement.start_s", "model_selection"),
+        stages=["identification.judge"],
 
 
 rule intervals:
@@ -150,10 +157,11 @@ rule intervals:
             *("study_seed", "actuator", *FIT, *SAMPLING, NOISE, "least_squares"),
             *("identifiability.confidence", "identifiability.verdicts_every"),
         ),
+        stages=["intervals.estimate"],
     message:
         "Estimating intervals of {wildcards.case}, {wildcards.batch}"
     script:
-        "../scripts/intervals.py"
+        "../scripts/stage.py"
 
 
 rule model_fits:
@@ -170,7 +178,8 @@ rule model_fits:
         runtime=60,
     params:
         **settings_of("study_seed", "actuator", *FIT, "model_selection", "least_squares"),
+        stages=["identification.fit"],
     message:
         "Fitting every sample model to {wildcards.case}, {wildcards.batch}"
     script:
-        "../scripts/model_fits.py"
+        "../scripts/stage.py"

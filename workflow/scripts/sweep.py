@@ -2,12 +2,11 @@
 
 from pathlib import Path
 
-from biogrip.figures.robustness import draw_robustness
+from biogrip.figures.overview import draw_robustness
 from biogrip.figures.style import save, styled
 from biogrip.stages.job import job_study, logged, paths
-from biogrip.stages.sweeps import judge
 from biogrip.tables.layout import write
-from biogrip.tables.sweeps import robustness
+from biogrip.tables.sweeps import judge, robustness
 
 with logged(snakemake):
     study, sweep = job_study(snakemake), snakemake.wildcards.sweep

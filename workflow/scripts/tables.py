@@ -1,8 +1,9 @@
 """Write the tables of the study, as far as it has what they are of."""
 
 from biogrip.stages.job import job_study, logged, paths
-from biogrip.tables import cases, coverage, methods
+from biogrip.tables import cases
 from biogrip.tables.layout import write
+from biogrip.tables.study import coverage, methods, models, verdict_counts
 
 with logged(snakemake):
     study = job_study(snakemake)
@@ -16,14 +17,14 @@ with logged(snakemake):
 
     tables = {
         "errors": lambda: cases.errors(study, given["identifications"]),
-        "methods": lambda: methods.methods(simulated, of(simulated, "identifications")),
-        "coverage": lambda: coverage.coverage(
+        "methods": lambda: methods(simulated, of(simulated, "identifications")),
+        "coverage": lambda: coverage(
             covered, of(covered, "targets"), given["intervals"], of(covered, "calibrated")
         ),
-        "verdict_counts": lambda: coverage.verdict_counts(
+        "verdict_counts": lambda: verdict_counts(
             counted, [file for file in given["intervals"] if file.parent.name in counted.cases]
         ),
-        "models": lambda: methods.models(study, given["fits"]),
+        "models": lambda: models(study, given["fits"]),
     }
     for file in paths(snakemake.output.tables):
         write(tables[file.stem](), file)

@@ -4,7 +4,7 @@ from contextlib import redirect_stdout
 from pathlib import Path
 
 from biogrip.command.files import identify_files
-from biogrip.command.settings import Setting
+from biogrip.command.options import Setting
 from biogrip.stages.job import logged
 
 with logged(snakemake), Path(snakemake.log[0]).open("a") as log, redirect_stdout(log):

@@ -8,34 +8,35 @@ import os
 import sys
 import traceback
 from collections import defaultdict
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from importlib.metadata import version
+from multiprocessing import get_context
+from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any, TypeVar
 
 from biogrip import __version__
+from biogrip.command.options import Setting
 from biogrip.command.outputs import (
     WRITTEN_BY,
     Outcome,
     as_written,
     check_output,
     read_result,
+    table_of,
     write_result,
-    write_table,
 )
 from biogrip.command.settings import (
     Asked,
-    Setting,
     check_settings,
     is_table,
     load_in_words,
     read_table,
     read_trace,
 )
-from biogrip.command.side_by_side import side_by_side
 from biogrip.command.words import in_columns, in_words
 from biogrip.errors import BiogripError
 from biogrip.files import digest_of, refuse_inputs, software
@@ -46,6 +47,8 @@ from biogrip.identify.other_fits import Trace
 from biogrip.identify.prepare import prepare
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.keys import plain
+from biogrip.processes import end_with
+from biogrip.records.rows import write_rows
 from biogrip.study.source import default_config
 from biogrip.study.study import Case
 from biogrip.terminal import Progress, visible
@@ -60,6 +63,7 @@ _MOST_IN_BATCH, _MOST_READINGS = 25, 200_000
 
 _KILLED = "a process was killed, perhaps because memory ran out"
 
+J = TypeVar("J")
 T = TypeVar("T")
 
 
@@ -114,7 +118,7 @@ def identify_files(
     copied = {own.name: own.copied for own in asked}
     outcome = replace(outcome, refused=outcome.refused | absent, copied=copied)
     if table is not None:
-        write_table(outcome, table)
+        write_rows(table, *table_of(outcome))
     if report is not None:
         from biogrip.command.page import write_page
 
@@ -188,6 +192,62 @@ def _identify_traces(
             add(single, alone or Outcome([], {trace: text}))
     every.found.extend(found[own.name] for own in asked if own.name in found)
     return every
+
+
+def side_by_side(work: Callable[[J], T], jobs: Sequence[J], most: int) -> Iterator[T | None]:
+    """Yield what work gives of each job, in their order; None if its process was killed.
+
+    Each job has a process of its own, so that a kill costs no other its result. At most some are
+    there at once; they are forked, and end when this one does, however that ends. An error that
+    work raises is raised here.
+    """
+    fork = get_context("fork")
+    running: dict[Any, tuple[int, Any]] = {}
+    done: dict[int, T | None] = {}
+    started = given = 0
+    try:
+        while given < len(jobs):
+            while started < len(jobs) and len(running) < most:
+                ours, theirs = fork.Pipe(duplex=False)
+                job = ours, theirs, os.getpid(), work, jobs[started]
+                process = fork.Process(target=_send, args=job)
+                process.start()
+                # What nobody can write to any more has an end.
+                theirs.close()
+                running[ours] = started, process
+                started += 1
+            ready: list[Any] = wait([*running])
+            for one in ready:
+                number, process = running.pop(one)
+                try:
+                    done[number], error = one.recv()
+                except (EOFError, OSError):
+                    done[number], error = None, None
+                process.join()
+                if error is not None:
+                    raise error
+            while given in done:
+                yield done.pop(given)
+                given += 1
+    finally:
+        for ours, (_, process) in running.items():
+            ours.close()
+            process.join()
+
+
+def _send(
+    ours: Connection, theirs: Connection, parent: int, work: Callable[[J], T], job: J
+) -> None:
+    """Send what work gives, and the error that it raises, of which one is None."""
+    end_with(parent)
+    # If the parent ends before, nobody reads what is sent.
+    ours.close()
+    try:
+        found: tuple[T | None, Exception | None] = work(job), None
+    except Exception as error:
+        found = None, error
+    with suppress(OSError):
+        theirs.send(found)
 
 
 def _made_from(asked: Asked) -> str:
@@ -321,7 +381,12 @@ def data_of(
         **trace_data(diagnosis),
         "without_model": diagnosis.without_model(case.block.identifiability.at_s).data(),
         "assumed": _assumed(diagnosis, case, list(tried or case.models)),
-        "by_default": _by_default(given) if case.instrument.has_jaws else [],
+        # What the user does not set; uncertainties are no gripper.
+        "by_default": [
+            name
+            for name in ("gripper", "protocol")
+            if case.instrument.has_jaws and not {*(given.get(name) or ())} - {"uncertainty"}
+        ],
         "versions": {
             "biogrip": __version__,
             **{name: version(name) for name in ("numpy", "scipy")},
@@ -352,11 +417,5 @@ def _assumed(diagnosis: Diagnosis, case: Case, tried: Sequence[str]) -> dict[str
         "fixed": case.fixed,
         "identifiability": {key: plain(getattr(asked, key)) for key in ("confidence", "at_s")},
         "model_selection": {"models": list(tried)},
-        "study_seed": case.study.study_seed,
+        "study_seed": case.study.config.study_seed,
     }
-
-
-def _by_default(given: Mapping[str, Any]) -> list[str]:
-    """Return which of gripper and protocol the user does not set; uncertainties are no gripper."""
-    blocks = ("gripper", "protocol")
-    return [name for name in blocks if not set(given.get(name) or ()) - {"uncertainty"}]

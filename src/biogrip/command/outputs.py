@@ -16,7 +16,7 @@ from biogrip.errors import BiogripError
 from biogrip.files import scratch_path, write_text
 from biogrip.judging.without_model import EXPONENT, LEVEL
 from biogrip.physics.instruments import INSTRUMENTS, ROTATION, Channel
-from biogrip.records.rows import AGAIN, read_object, whole, write_object, write_rows
+from biogrip.records.rows import AGAIN, read_object, whole, write_object
 from biogrip.terminal import visible, visible_lines
 
 WRITTEN_BY = "written_by_biogrip"
@@ -126,11 +126,6 @@ def _in_units(name: str, read: Channel) -> str:
     return _RADIANS.sub(read.suffix, name)
 
 
-def write_table(outcome: Outcome, table: Path) -> None:
-    """Write `table_of` traces as CSV."""
-    write_rows(table, *table_of(outcome))
-
-
 def table_of(outcome: Outcome) -> tuple[list[str], list[list[Any]]]:
     """Return header and rows, one a trace: numbers with units, and why it failed if so.
 
@@ -173,7 +168,7 @@ def table_of(outcome: Outcome) -> tuple[list[str], list[list[Any]]]:
 
 
 def join_tables(parts: Sequence[Path], table: Path, rows: int) -> None:
-    """Write the rows of several tables of traces as one, as if `write_table` had written all."""
+    """Write the rows of several tables of traces as one, as if all had been written at once."""
     # Imported here: loading pandas takes long.
     import pandas as pd
 

@@ -3,14 +3,11 @@
 Pictures are Matplotlib's. A page of very many traces has the figure and the table only.
 """
 
-import base64
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import numpy as np
 import yaml
 from matplotlib.figure import Figure
@@ -25,31 +22,20 @@ from biogrip.command.words import (
     set_up_in_words,
     together,
 )
-from biogrip.digits import legible, with_unit
+from biogrip.digits import with_unit
+from biogrip.figures import style
 from biogrip.figures.cells import ONE_COLUMN_IN, draw_cells
 from biogrip.figures.fit import draw_fit, fit_of
 from biogrip.figures.likelihood import draw_profiles_of
-from biogrip.figures.style import (
-    COLUMN_IN,
-    FITTED,
-    MEASURED,
-    PAGE_IN,
-    SHADE,
-    figure,
-    in_few_colours,
-    is_over_decades,
-    save_png,
-    styled,
-)
 from biogrip.files import write_text
 from biogrip.judging.cells import CELL, Told, compare, gather, shared_columns
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.judging.doubts import DOUBTFUL, OK, REJECTED
 from biogrip.judging.without_model import LEVEL, level_turned
+from biogrip.page.page import TEMPLATES, data_url
 from biogrip.physics.protocol import evaluate, hold, join_phases
 from biogrip.physics.simulation import simulated_response
-from biogrip.records.traces import of_recording
-from biogrip.terminal import visible, visible_lines
+from biogrip.terminal import visible_lines
 
 _MARKS = {OK: "✓", DOUBTFUL: "!", REJECTED: "✕"}
 # Most groups of a column that a figure shows, and the word of all traces where there is no such.
@@ -66,7 +52,7 @@ def draw(diagnosis: Diagnosis, data: Mapping[str, Any]) -> list[str]:
     A third one is of the level over time, as far as that is told without a model.
     """
     drawn = draw_best(diagnosis)
-    with styled():
+    with style.styled():
         more = [draw_level(diagnosis, data)] if data["without_model"]["quantities"] else []
         return [_address(each) for each in (drawn, draw_profiles_of(data), *more)]
 
@@ -86,16 +72,16 @@ def draw_level(diagnosis: Diagnosis, data: Mapping[str, Any]) -> Figure:
     network = experiment.searched.network(np.exp(diagnosis.likelihood.best))
     best = simulated_response(experiment.gripper, network, step, times, nonlinear=False)[0]
     turned = level_turned(diagnosis.likelihood.problem.residuals) or (lambda response: response)
-    drawn = figure(COLUMN_IN, 2.4)
+    drawn = style.figure(style.COLUMN_IN, 2.4)
     axes = drawn.subplots()
     low, high = np.array([(it.low, it.high) for it in told], dtype=float).T
-    axes.fill_between(times, low, high, color=SHADE, label="any linear sample")
-    axes.plot(times, turned(best), "--", color=FITTED, label="best fit")
+    axes.fill_between(times, low, high, color=style.SHADE, label="any linear sample")
+    axes.plot(times, turned(best), "--", color=style.FITTED, label="best fit")
     after = recording.time_s > 0
     held = evaluate(experiment.torque, recording.time_s[after])
     if not (experiment.instrument.sweeps or np.ptp(held) or experiment.offset_and_drift):
         readings = turned(recording.readings[after] / held)
-        axes.plot(recording.time_s[after], readings, ".", color=MEASURED, markersize=1.2)
+        axes.plot(recording.time_s[after], readings, ".", color=style.MEASURED, markersize=1.2)
     ends = float(np.nanmin(low)), float(np.nanmax(high))
     axes.set_ylim(ends[0] - 0.1 * np.ptp(ends), ends[1] + 0.1 * np.ptp(ends))
     axes.set(xscale="log", xlabel="time after a step (s)", xlim=times[[0, -1]])
@@ -113,13 +99,12 @@ def draw_best(diagnosis: Diagnosis) -> Figure:
     assert experiment is not None
     assert recording is not None
     found = {finding.quantity.label: finding.value for finding in diagnosis.findings}
-    values = {name: found[name] for name in experiment.searched.names}
-    fit = fit_of(experiment, {**experiment.fixed, **values}, of_recording(recording), 0)
+    fit = fit_of(experiment, found, recording.time_s, recording.readings, recording.sd)
     start_s = recording.onset_s or 0.0
-    spread = is_over_decades(fit.time_s)
+    spread = style.is_over_decades(fit.time_s)
     if not spread:
         fit = replace(fit, time_s=fit.time_s + start_s)
-    with styled():
+    with style.styled():
         drawn = draw_fit({"best fit": fit}, "")
         if spread and start_s:
             drawn.axes[-1].set_xlabel(f"time since {start_s:.6g} s of the clock (s)")
@@ -127,9 +112,7 @@ def draw_best(diagnosis: Diagnosis) -> Figure:
 
 
 def _address(drawn: Figure) -> str:
-    png = BytesIO()
-    save_png(drawn, png)
-    return f"data:image/png;base64,{base64.b64encode(in_few_colours(png, 64)).decode()}"
+    return data_url("image/png", style.png_of(drawn, 64))
 
 
 def draw_traces(outcome: Outcome, columns: Mapping[str, str]) -> tuple[Figure, str]:
@@ -154,7 +137,7 @@ def draw_traces(outcome: Outcome, columns: Mapping[str, str]) -> tuple[Figure, s
     said = f"Groups: {by}. " if by != _ALL else ""
     said += f"Large marks: means of each {unit}." if unit else "Cells are taken for independent."
     # A panel each side by side, as many as a screen has room for.
-    width_in = max(PAGE_IN, ONE_COLUMN_IN / 2 * min(len(columns), _MOST_PANELS))
+    width_in = max(style.PAGE_IN, ONE_COLUMN_IN / 2 * min(len(columns), _MOST_PANELS))
     return draw_cells(cells, compared, {name: units[name] for name in columns}, width_in), said
 
 
@@ -167,13 +150,12 @@ def _told(found: Mapping[str, Any], copied: Mapping[str, str]) -> Told:
 
 def write_page(outcome: Outcome, page: Path) -> None:
     """Write results, with pictures as far as there are any, as HTML."""
-    here = Path(__file__).parent
     traces, copied = outcome.found, outcome.copied
     columns = words.columns_of(traces)
     several = len(traces) != 1 or bool(outcome.refused)
     figure_of_all = groups = ""
     if several and traces:
-        with styled():
+        with style.styled():
             drawn, groups = draw_traces(outcome, columns)
             figure_of_all = _address(drawn)
     outcomes = [(it["trace"], it["fit"], " ".join(it["reasons"])) for it in traces]
@@ -183,14 +165,7 @@ def write_page(outcome: Outcome, page: Path) -> None:
     assumed: dict[str, dict[str, Any]] = {each["trace"]: each["assumed"] for each in traces}
     shared = common([*assumed.values()])
     own = {trace: _as_yaml(beyond(block, shared)) for trace, block in assumed.items()}
-    environment = jinja2.Environment(
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        loader=jinja2.FileSystemLoader(here),
-    )
-    environment.filters |= {"visible": visible, "legible": legible}
-    text = environment.get_template("page.html.j2").render(
+    text = TEMPLATES.get_template("traces.html.j2").render(
         traces=traces,
         refused={trace: visible_lines(reason) for trace, reason in outcome.refused.items()},
         pictures=outcome.pictures,
@@ -209,7 +184,6 @@ def write_page(outcome: Outcome, page: Path) -> None:
         counts={status: sum(each["fit"] == status for each in traces) for status in _MARKS},
         words=words,
         written_by=f"{WRITTEN_BY} {__version__}",
-        style=(here.parent / "page/report.css").read_text(encoding="utf-8"),
     )
     write_text(page, text)
 

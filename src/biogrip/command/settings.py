@@ -13,7 +13,7 @@ import csv
 import os
 import re
 from collections import defaultdict
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.command.options import OPTIONS
+from biogrip.command.options import OPTIONS, Setting
 from biogrip.command.outputs import COLUMNS
 from biogrip.digits import counted, plain
 from biogrip.errors import BiogripError, nearest
@@ -82,23 +82,13 @@ _BY_SPHERE = {"force": "stress", "displacement": "strain"}
 # Of each group of keys of the measurement, the one that is set last replaces the others.
 _ONE_OF = {"start_s", "fit_start"}, {*READINGS}
 _MOST_SHOWN = 10
+# Similarity of a name with two letters exchanged, as hodl and hold.
+_MISSPELT = 0.75
 _SEPARATORS = ",;\t"
 # Blocks whose numbers are an instrument's.
 _INSTRUMENT = ("gripper", "actuator")
 _OF_RESULTS = re.compile(r".* (verdict|value|low|high)( \(.*\))?")
 _HEAD_BYTES = 100_000
-
-
-@dataclass(frozen=True)
-class Setting:
-    """A key of the config, and the value that an option or a cell of a table gives it."""
-
-    by: str
-    """The option, or line and column of the table, for messages."""
-    path: tuple[str, ...]
-    """The key."""
-    value: Any
-    """Plain value, not yet checked."""
 
 
 @dataclass(frozen=True)
@@ -132,14 +122,18 @@ class Asked:
         return self.trace.with_name(f"{self.trace.stem}{part}.identified.json")
 
     @property
+    def configs(self) -> list[Path]:
+        """The user's config, if there is one."""
+        return [self.config] if self.config else []
+
+    @property
     def given(self) -> dict[str, Any]:
         """Blocks of the user's: those of the config, and over them the settings."""
-        blocks = read_configs([self.config] if self.config else [])
+        blocks = read_configs(self.configs)
         for setting in self.settings:
             blocks = _laid_over(blocks, setting)
-        measured = blocks.get("measurement")
-        measured = measured if isinstance(measured, dict) and measured.get("sphere") else {}
-        for name in {*measured} & {*_BY_SPHERE.values()}:
+        measured = _measured(blocks)
+        for name in {*measured} & {*_BY_SPHERE.values()} if measured.get("sphere") else ():
             raise BiogripError(
                 f"{self.place}: found a sphere and a reading of {name}; allowed are a force and an "
                 "indentation, as by --reading force=COLUMN."
@@ -153,13 +147,18 @@ class Asked:
         return read_recording(self.trace, columns)
 
 
+def _measured(blocks: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the keys of the measurement; none where no block is given for it."""
+    measured = blocks.get("measurement")
+    return measured if isinstance(measured, dict) else {}
+
+
 def _laid_over(blocks: dict[str, Any], setting: Setting) -> dict[str, Any]:
     """Return the blocks with a setting, and without what it replaces."""
     path, value = setting.path, deepcopy(setting.value)
-    measured = blocks.get("measurement")
-    if path[0] == "measurement" and isinstance(measured, dict):
-        for name in (name for group in _ONE_OF if group & {*path[1:2]} for name in group):
-            measured.pop(name, None)
+    for group in _ONE_OF if path[0] == "measurement" else ():
+        for name in group if group & {*path[1:2]} else ():
+            _measured(blocks).pop(name, None)
     # A candidate's name says its branches, too.
     name = str(value).lower() if path == ("sample", "model") else ""
     if prony := _PRONY.fullmatch(name):
@@ -175,8 +174,8 @@ def _laid_over(blocks: dict[str, Any], setting: Setting) -> dict[str, Any]:
 
 def _by_sphere(blocks: dict[str, Any]) -> dict[str, Any]:
     """Return the blocks with a sphere's force and indentation as what they count as."""
-    measured = blocks.get("measurement")
-    if not isinstance(measured, dict) or measured.get("sphere") is None:
+    measured = _measured(blocks)
+    if measured.get("sphere") is None:
         return blocks
     renamed = {_BY_SPHERE.get(key, key): value for key, value in measured.items()}
     return {**blocks, "measurement": renamed}
@@ -208,13 +207,12 @@ def study_of(asked: Asked) -> tuple[str, dict[str, Any], Recording | None, Array
     The trace comes along if its protocol follows from it, and what was controlled if it was
     recorded.
     """
-    files = [default_config(), *([asked.config] if asked.config else [])]
-    below = read_configs(files)
     given = asked.given
     if len(found := [key for key in _PROTOCOLS if key in keys_in(given)]) > 1:
-        of_config = [*keys_in(read_configs([asked.config] if asked.config else []))]
+        of_config = [*keys_in(read_configs(asked.configs))]
         said = [".".join(key) + f" of {asked.config}" * (key in of_config) for key in found]
         raise BiogripError(f"{asked.place}: found {' and '.join(said)}; allowed is one of them.")
+    below = read_configs([default_config(), *asked.configs])
     merged, recording, record = _with_instrument(_by_sphere(overlaid(below, given)), given, asked)
     # Cases and a table of the config are meant for the workflow.
     for name in ("only", "traces"):
@@ -228,7 +226,7 @@ def study_of(asked: Asked) -> tuple[str, dict[str, Any], Recording | None, Array
 def _case_of(asked: Asked) -> tuple[Case, Recording | None]:
     """Return the case that a trace is, and the trace if its protocol follows from it."""
     case, merged, recording, record = study_of(asked)
-    files = [default_config(), *([asked.config] if asked.config else [])]
+    files = [default_config(), *asked.configs]
     below = read_configs(files)
     sources = [_source(setting, below, merged, case) for setting in asked.settings]
     try:
@@ -298,7 +296,10 @@ def _with_instrument(
         level = None
     elif level is not None:
         level = controlled.in_si(*held_unit(level, controlled, by))
-    own = _recording(asked, block)
+    own = None
+    # Whoever uses the trace says what is wrong.
+    with suppress(BiogripError):
+        own = asked.read(block.columns) if block else None
     phase = {"duration_s": 1.0, controlled.column: 1.0 if level is None else level}
     record, start_s = None, measurement.get("start_s")
     if own is not None and own.load is not None:
@@ -351,13 +352,6 @@ def _instrument(merged: Mapping[str, Any], given: Mapping[str, Any]) -> Instrume
     return next((each for each in some if each.controlled.column in keys), some[0])
 
 
-def _recording(asked: Asked, block: MeasurementBlock | None) -> Recording | None:
-    """Read a trace; return None if whoever uses it will say what is wrong."""
-    with suppress(BiogripError):
-        return None if block is None else asked.read(block.columns)
-    return None
-
-
 def check_settings(traces: Sequence[Asked]) -> None:
     """Refuse settings that cannot be used, of all traces at once, before anything is fitted.
 
@@ -400,8 +394,7 @@ def is_table(asked: Asked) -> bool:
     )
     if (name := _file_column(names)) is None:
         return False
-    measured = asked.given.get("measurement")
-    measured = measured if isinstance(measured, dict) else {}
+    measured = _measured(asked.given)
     readings = {measured[key] for key in READINGS if key in measured} or {"rotation_rad"}
     if measured.get("time", "time_s") in names and readings & {*names}:
         return False
@@ -429,7 +422,7 @@ def _meant(name: str, cells: Sequence[str]) -> str | None:
         for cell in cells:
             number_and_unit(cell)
     except ValueError:
-        return next((word for word in _OF_WORDS if _misspelt(plain, word)), None)
+        return next(iter(get_close_matches(plain, _OF_WORDS, n=1, cutoff=_MISSPELT)), None)
     blocks = read_configs([default_config()])
     keys = [path for path in keys_in(blocks) if path[0] in _INSTRUMENT]
     known = {str(path[-1]): dotted(path) for path in keys} | dict.fromkeys(_HELD, "hold")
@@ -441,15 +434,9 @@ def _meant(name: str, cells: Sequence[str]) -> str | None:
     bare = re.sub(r"_?[(\[].*$|_[^_]+$", "", plain)
     if plain in by_plain or by_plain.get(bare) in _OF_NUMBERS:
         return by_plain.get(plain, by_plain.get(bare))
-    close = get_close_matches(plain, [key for key in by_plain if "_" in key], n=1, cutoff=0.9)
-    near = [key for key in _OF_NUMBERS if _misspelt(plain, key)]
-    return by_plain[(close or near)[0]] if close or near else None
-
-
-def _misspelt(name: str, option: str) -> bool:
-    """Return True if a name has an option's letters in another order, or nearly in theirs."""
-    close = len(name) > 3 and get_close_matches(name, [option], cutoff=0.8)
-    return bool(close) or sorted(name) == sorted(option)
+    near = get_close_matches(plain, [key for key in by_plain if "_" in key], n=1, cutoff=0.9)
+    near += get_close_matches(plain, _OF_NUMBERS, n=1, cutoff=_MISSPELT)
+    return by_plain[near[0]] if near else None
 
 
 def read_table(
@@ -468,14 +455,12 @@ def read_table(
             f"one.{nearest(_FILES[0], header)}"
         )
     options_of = {name: _plain(name) for name in header if _plain(name) in OPTIONS}
-    problems = list(_name_problems(path, header, [file, *options_of]))
-    problems += _unused(path, header, rows, {file, *options_of})
+    problems = list(_column_problems(path, header, rows, {file, *options_of}))
+    used = {"", *options_of, *(name for name in header if "." in name)}
+    kept = [(line, row) for line, row in rows if any(row)]
     found: list[Asked] = []
-    lines: list[int] = []
     set_by: list[dict[str, str]] = []
-    for line, row in rows:
-        if not any(row):
-            continue
+    for line, row in kept:
         if any(row[len(header) :]):
             text = f"found {counted(len(row), 'cell')} in the row, allowed are the header's"
             problems.append(f"{place(path, line)}: {text} {len(header)}.")
@@ -484,23 +469,19 @@ def read_table(
         if trace == path.parent:
             problems.append(f"{place(path, line, file)}: found nothing, allowed is a trace.")
         settings = list(options)
-        for name, cell in by_name.items():
-            if ("." in name or name in options_of) and cell:
-                try:
-                    settings += _settings_of(
-                        cell, name, options_of.get(name), place(path, line, name)
-                    )
-                except (BiogripError, ValueError) as error:
-                    problems.append(f"{place(path, line, name)}: {error}")
-        used = {"", *options_of, *(name for name in by_name if "." in name)}
+        set_by.append({name: cell for name, cell in by_name.items() if name in used})
+        for name, cell in set_by[-1].items():
+            where = place(path, line, name)
+            try:
+                settings += _settings_of(cell, name, options_of.get(name), where)
+            except (BiogripError, ValueError) as error:
+                problems.append(f"{where}: {error}")
         copied = {name: cell for name, cell in by_name.items() if name not in used}
         found.append(Asked(trace, config, tuple(settings), place(path, line), copied))
-        set_by.append({name: cell for name, cell in by_name.items() if name in used})
-        lines.append(line)
     if not found:
         problems.append(f"{place(path)}: found no traces, allowed is a row for each.")
     parts, before = _parts([own.trace for own in found], set_by), dict[tuple[str, str], int]()
-    for index, (own, line, part) in enumerate(zip(found, lines, parts, strict=True)):
+    for index, (own, (line, _), part) in enumerate(zip(found, kept, parts, strict=True)):
         first = before.setdefault((os.path.realpath(own.trace), part), line)
         if first != line and own.trace != path.parent:
             text = f"found '{visible(own.trace)}' again, as on line {first}; allowed is each"
@@ -527,6 +508,8 @@ def _parts(traces: Sequence[Path], set_by: Sequence[Mapping[str, str]]) -> list[
 
 def _settings_of(cell: str, name: str, option: str | None, by: str) -> Iterator[Setting]:
     """Yield what a cell sets, in a column named after an option, or after a key with dots."""
+    if not (name and cell):
+        return
     key = name if option is None else OPTIONS[option]
     if isinstance(key, str):
         yield Setting(by, tuple(key.split(".")), value_of(cell, name))
@@ -551,30 +534,24 @@ def _rows(path: Path) -> list[tuple[int, list[str]]]:
         raise BiogripError(f"{place(path)}: cannot be read as a table: {error}.") from error
 
 
-def _unused(
+def _column_problems(
     path: Path, header: Sequence[str], rows: Sequence[tuple[int, list[str]]], used: set[str]
 ) -> Iterator[str]:
-    """Find columns that look like settings, and would only be copied."""
+    """Find names that stand twice or are those of results, and what looks like a setting."""
     for number, name in enumerate(header):
         cells = [cell for _, row in rows for cell in row[number : number + 1] if cell]
-        if not name or "." in name or name in used or not cells:
-            continue
-        meant = _meant(name, cells)
-        if meant and meant not in map(_plain, header):
-            yield (
-                f"{place(path, 1, name)}: looks like a setting and is none; allowed is "
-                f"'{meant}' for a column that sets it, in SI units, or a name unlike a setting's."
-            )
-
-
-def _name_problems(path: Path, header: Sequence[str], used: Collection[str]) -> Iterator[str]:
-    """Find names that stand twice, or, if they are not used, would be taken for results."""
-    for number, name in enumerate(header):
         text = ""
         if name and name in header[:number]:
             text = "stands twice; allowed is each name once."
         elif name not in used and (name in COLUMNS or _OF_RESULTS.fullmatch(name)):
             text = "is a column of the results; allowed is another name."
+        elif name and cells and "." not in name and name not in used:
+            meant = _meant(name, cells)
+            if meant and meant not in map(_plain, header):
+                text = (
+                    f"looks like a setting and is none; allowed is '{meant}' for a column that "
+                    "sets it, in SI units, or a name unlike a setting's."
+                )
         if text:
             yield f"{place(path, 1, name)}: {text}"
 

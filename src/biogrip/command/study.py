@@ -12,12 +12,13 @@ from typing import Any
 import yaml
 
 from biogrip.command.files import traces_of
-from biogrip.command.settings import Asked, Setting, read_trace, study_of
+from biogrip.command.options import Setting
+from biogrip.command.settings import Asked, read_trace, study_of
 from biogrip.errors import BiogripError
 from biogrip.files import scratch_path, write_text
 from biogrip.identify.prepare import prepare
 from biogrip.study.case_blocks import OVERRIDABLE
-from biogrip.study.source import default_config, overlaid, snakefile
+from biogrip.study.source import default_config, overlaid, shipped
 from biogrip.study.study import read_configs
 from biogrip.terminal import visible
 from biogrip.traces.columns import trace_file_problem
@@ -25,8 +26,8 @@ from biogrip.traces.columns import trace_file_problem
 
 def write_study(
     files: Sequence[Path],
-    config: Path | None,
-    settings: Sequence[Setting],
+    config: Path | None = None,
+    settings: Sequence[Setting] = (),
     folder: Path | None = None,
 ) -> None:
     """Write the config of a study of traces into a new folder, and print how it is run.
@@ -48,11 +49,11 @@ def write_study(
     scratch.mkdir()
     write_text(scratch / "study.yaml", yaml.safe_dump(study, sort_keys=False, allow_unicode=True))
     scratch.rename(folder)
-    here = Path("Snakefile")
-    rules = [] if here.is_file() and snakefile().samefile(here) else ["-s", str(snakefile())]
+    here, rules = Path("Snakefile"), shipped("Snakefile")
+    named = [] if here.is_file() and rules.samefile(here) else ["-s", str(rules)]
     given = ["--directory", str(folder), "--configfile", str(folder / "study.yaml")]
     print(f"Written to {visible(folder / 'study.yaml')}. Run the study, and open its page:\n")
-    print(f"  {shlex.join(['snakemake', '-j2', *rules, *given])}")
+    print(f"  {shlex.join(['snakemake', '-j2', *named, *given])}")
     print(f"  {visible(folder / 'results' / 'report.html')}")
 
 

@@ -1,8 +1,6 @@
 """Results of identification in words: for a terminal, and what a paper says of the methods."""
 
-import os
 import re
-import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import log
 from textwrap import indent
@@ -11,26 +9,12 @@ from typing import Any
 from biogrip import __version__
 from biogrip.digits import counted, instant, legible, plain, with_limits, with_unit, within_limits
 from biogrip.judging.doubts import DOUBT, DOUBTFUL, HARMLESS, OK, REJECTED, REJECTION
-from biogrip.judging.verdicts import (
-    BOUNDED_ABOVE,
-    BOUNDED_BELOW,
-    DETERMINED,
-    FIT_REJECTED,
-    NOT_DETERMINED,
-)
+from biogrip.judging.verdicts import FIT_REJECTED, NOT_DETERMINED
 from biogrip.judging.without_model import BEYOND, EXPONENT, FLOW, LEVEL, LOSS
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.models import CANDIDATES
 from biogrip.study.measurement_block import KNOWN_NOISE
 from biogrip.terminal import aligned, visible, visible_lines
-
-_COLOURS = {
-    DETERMINED: 32,
-    BOUNDED_ABOVE: 33,
-    BOUNDED_BELOW: 33,
-    NOT_DETERMINED: 31,
-    FIT_REJECTED: 90,
-}
 
 # Instrument whose readings span decades: their misfit is told over their noise.
 _SWEEPS = "oscillation"
@@ -58,10 +42,7 @@ def in_words(found: Mapping[str, Any]) -> str:
         misfit_in_words(found),
         *(without_model_in_words(found) if rejected else []),
         f"{found['model_title']}, {100 * found['confidence']:g} % limits:",
-        *(
-            f"  {item['quantity']:<{width}}  {_coloured(item['in_words'], item['verdict'])}"
-            for item in found["quantities"]
-        ),
+        *(f"  {item['quantity']:<{width}}  {item['in_words']}" for item in found["quantities"]),
     ]
     lines += [] if rejected else without_model_in_words(found)
     lines += one_sided_in_words([found], foremost(found))
@@ -194,20 +175,16 @@ def for_a_paper(found: Mapping[str, Any]) -> list[tuple[str, str]]:
             numbers = within_limits(each["value"], low, high)
         provided = f", provided {each['provided']}" if each["provided"] else ""
         value, reach = f"{numbers[0]} {each['unit']}".rstrip(), " to ".join(numbers[1:])
-        text = f"{each['quantity']} {sign} {value} ({confidence:g} % {f'{kind} {reach}'.rstrip()}, "
-        text += f"n = 1 trace{provided})"
-        numbers = [re.sub(r"e([+-]\d+)", _power_in_latex, it) for it in numbers]
-        unit = each["unit"].replace(" ", r"\,")
-        value = numbers[0] + (rf"\,\mathrm{{{unit}}}" if unit else "")
-        reach = " to ".join(f"${it}$" for it in numbers[1:])
-        latex = rf"${each['symbol'].replace('$', '')} {sign} {value}$ ({confidence:g}\,\% "
-        latex += rf"{f'{kind} {reach}'.rstrip()}, $n = 1$ trace{provided})"
-        pairs.append((text, latex))
+        told = f" {sign} {value} ({confidence:g} % {f'{kind} {reach}'.rstrip()}, n = 1 trace"
+        told += f"{provided})"
+        pairs.append((f"{each['quantity']}{told}", f"{each['symbol']}{_in_latex(told)}"))
     return pairs
 
 
-def _power_in_latex(exponent: re.Match[str]) -> str:
-    return rf" \times 10^{{{int(exponent[1])}}}"
+def _in_latex(text: str) -> str:
+    """Return text as LaTeX, with powers of ten as mathematics."""
+    latex = text.translate(_LATEX_OF)
+    return _POWER.sub(lambda it: rf"${it[1]} \times 10^{{{int(it[2])}}}$", latex)
 
 
 def further_notes(found: Mapping[str, Any]) -> list[str]:
@@ -222,10 +199,7 @@ def in_columns(found: Sequence[Mapping[str, Any]], refused: Mapping[str, str]) -
         columns = columns_of(found)
         rows = []
         for each in found:
-            cells = {
-                q["quantity"]: _coloured(limits_in_short(q), q["verdict"])
-                for q in each["quantities"]
-            }
+            cells = {q["quantity"]: limits_in_short(q) for q in each["quantities"]}
             own = (cells.get(label, "") for label in columns)
             rows.append([visible(each["trace"]), each["fit"], *own])
         lines.append(aligned(rows, ["trace", "fit", *columns.values()]))
@@ -320,17 +294,10 @@ def limits_in_short(quantity: Mapping[str, Any]) -> str:
     return "?" if high is None else f"≤ {plain(high, 2)}"
 
 
-def _coloured(text: str, verdict: str) -> str:
-    """Colour a verdict if standard output is a terminal (https://no-color.org)."""
-    if not sys.stdout.isatty() or os.environ.get("NO_COLOR"):
-        return text
-    return f"\x1b[{_COLOURS[verdict]}m{text}\x1b[0m"
-
-
 REFERENCE = (
     "The biogrip authors, biogrip: how well a MEMS microgripper identifies the viscoelastic "
+    f"parameters of a cell, version {__version__}, 2026"
 )
-REFERENCE += f"parameters of a cell, version {__version__}, 2026"
 """How biogrip is cited, as in CITATION.cff."""
 
 _INSTRUMENTS = {
@@ -340,10 +307,10 @@ _INSTRUMENTS = {
     "oscillation": "In oscillation storage and loss moduli were recorded over frequency",
 }
 _MOST_PHASES, _MOST_REFUSED = 4, 3
-_IN_LATEX = str.maketrans(
+_LATEX_OF = str.maketrans(
     {
         **{sign: rf"\{sign}" for sign in "%_&#${}"},
-        **{"\\": r"\textbackslash{}", "^": r"\^{}", "~": r"\~{}"},
+        **{"\\": r"\textbackslash{}", "^": r"\^{}", "~": r"\~{}", "<": "$<$", ">": "$>$"},
         **{"²": "$^2$", "χ": r"$\chi$", "τ": r"$\tau$", "Δ": r"$\Delta$", "→": r"$\to$"},
     }
 )
@@ -468,7 +435,4 @@ def paragraph(sentences: Iterable[str], version: str = __version__) -> tuple[str
     """Return a paragraph as text and as LaTeX; at its end the software."""
     reference = REFERENCE.replace(__version__, version)
     text = " ".join([*sentences, f"Computed with biogrip {version} ({reference})."])
-    latex = _POWER.sub(
-        lambda it: rf"${it[1]} \times 10^{{{int(it[2])}}}$", text.translate(_IN_LATEX)
-    )
-    return legible(text), latex
+    return legible(text), _in_latex(text)

@@ -13,17 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
 from biogrip.digits import plain, with_limits, with_unit
-from biogrip.figures.style import (
-    BLACK,
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    PURPLE,
-    SKY,
-    figure,
-    literal,
-)
+from biogrip.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, figure, literal
 from biogrip.judging.cells import Cell, Compared, no_longer_log, unit_means
 from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW
 from biogrip.terminal import visible

@@ -1,6 +1,6 @@
 """Runs of the methods: Figures 8 and 10 over generations, where all runs end, and their errors."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from statistics import NormalDist
 from typing import Any
@@ -14,36 +14,23 @@ from matplotlib.ticker import LogLocator, MaxNLocator
 
 from biogrip.arrays import Array
 from biogrip.digits import with_unit
-from biogrip.figures.fit import SHOWN_SEEDS, first_of_basins, read_history, seeds_in_words
-from biogrip.figures.style import (
-    ALL_SEEDS,
-    COLUMN_IN,
-    PAPER,
-    RUNS,
-    SHADE,
-    TARGET,
-    figure,
-    line_of,
-    panel,
-    points_within,
-    row_of_panels,
-)
-from biogrip.judging.likelihood import bound
-from biogrip.judging.quantities import Quantity, parameters_and_sum
+from biogrip.figures import style
+from biogrip.figures.fit import SHOWN_SEEDS, first_of_basins, seeds_in_words
+from biogrip.judging.quantities import Quantity
 from biogrip.judging.verdicts import DETERMINED
-from biogrip.physics.noise import standard_deviation
 from biogrip.records.identifications import (
     ENCODABLE,
     chi_square_increase,
     near_noise,
     near_noise_words,
     reached_encodable,
+    read_histories,
     read_identifications,
     read_verdicts,
     share_in_words,
 )
-from biogrip.records.traces import read_target
 from biogrip.study.study import Case
+from biogrip.tables.study import bounds_at_truth
 
 _TICKS = (0, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000)
 # Of increases of chi-squared, smaller ones being drawn there.
@@ -52,36 +39,49 @@ _LOWEST = 1e-3
 
 def _line_of_seed(seed: object, shown: Sequence[int], alpha: float) -> dict[str, Any]:
     if seed in shown:
-        return {"color": RUNS[shown.index(seed)], "linewidth": 1.5, "zorder": 3}
-    return {"color": ALL_SEEDS, "linewidth": 0.4, "alpha": alpha}
+        return {"color": style.RUNS[shown.index(seed)], "linewidth": 1.5, "zorder": 3}
+    return {"color": style.ALL_SEEDS, "linewidth": 0.4, "alpha": alpha}
 
 
 def _name_seeds(axes: Axes, seeds: int, first: Iterable[str]) -> None:
     """Add to the legend what the lines of seeds are."""
     if seeds > 1:
-        axes.plot([], [], color=ALL_SEEDS, linewidth=0.8, label=seeds_in_words(seeds))
-    for words, color in zip(first, RUNS, strict=False):
+        axes.plot([], [], color=style.ALL_SEEDS, linewidth=0.8, label=seeds_in_words(seeds))
+    for words, color in zip(first, style.RUNS, strict=False):
         axes.plot([], [], color=color, label=words)
+
+
+def _runs(
+    case: Case, identifications: Path, histories: Path, values: Sequence[str]
+) -> tuple[pd.DataFrame, list[str], list[int], pd.DataFrame]:
+    """Return runs of the shown method, names and seeds of the first in each basin, and histories.
+
+    Histories are those of the seeds drawn individually and of these first ones.
+    """
+    method = case.study.shown_method.name
+    found = read_identifications(identifications, case, method)
+    first = first_of_basins(found, case.study.near_noise_tolerance)
+    shown = [int(run["seed"]) for run in first.values()]
+    history = read_histories(histories, method, values)
+    drawn = history["seed"].isin({*range(SHOWN_SEEDS), *shown})
+    return found, list(first), shown, history[drawn]
 
 
 def draw_convergence(case: Case, identifications: Path, histories: Path) -> Figure:
     """Draw each seed's excess of the misfit over its noise, highlighting a run of each basin."""
     method, tolerance = case.study.shown_method, case.study.near_noise_tolerance
-    found = read_identifications(identifications, case, method.name)
+    found, first, shown, history = _runs(case, identifications, histories, ["best_misfit"])
     noise = found.set_index("seed")["noise_rms"]
     noisy = bool((noise > 0).all())
     unit = noise if noisy else pd.Series(found["misfit"].min(), index=noise.index)
-    first = first_of_basins(found, tolerance)
-    shown = [int(run["seed"]) for run in first.values()]
-    history = read_history(histories, method.name, shown)
-    drawn = figure(COLUMN_IN, 2.9)
+    drawn = style.figure(style.COLUMN_IN, 2.9)
     axes = drawn.subplots()
     for seed, rows in history.groupby("seed"):
         excess = 100 * (rows["best_misfit"] / unit[seed] - 1)
         axes.plot(rows["generation"], excess, **_line_of_seed(seed, shown, 0.7))
     _name_seeds(axes, len(found), first)
     label = "noise in the trace" if noisy else "lowest misfit"
-    axes.axhline(0, color=TARGET, linestyle="--", linewidth=0.8, label=label)
+    axes.axhline(0, color=style.TARGET, linestyle="--", linewidth=0.8, label=label)
     last = int(history["generation"].max())
     if "genetic_algorithm" in method.blocks:
         mutation_start = case.block.genetic_algorithm.mutation_start
@@ -96,7 +96,7 @@ def draw_convergence(case: Case, identifications: Path, histories: Path) -> Figu
     axes.set_ylabel(f"best misfit above {'noise' if noisy else 'the lowest'} (%)")
     if noisy:
         words, near = near_noise_words(tolerance), 100 * tolerance
-        axes.axhline(near, color=TARGET, linestyle="-.", linewidth=0.8, label=words)
+        axes.axhline(near, color=style.TARGET, linestyle="-.", linewidth=0.8, label=words)
         reached = near_noise(found, tolerance).sum()
         axes.set_title(f"{case.title}: {reached} of {len(found)} {words}")
     drawn.legend(loc="outside lower center", ncols=2)
@@ -105,7 +105,7 @@ def draw_convergence(case: Case, identifications: Path, histories: Path) -> Figu
 
 def _mark_mutation(axes: Axes, start: int, last: int) -> None:
     """Mark the generation in which mutation starts, with a label below the curves."""
-    axes.axvline(start, color=TARGET, linestyle=":", linewidth=0.8)
+    axes.axvline(start, color=style.TARGET, linestyle=":", linewidth=0.8)
     before = start > last / 2
     axes.annotate(
         "mutation starts",
@@ -121,24 +121,20 @@ def _mark_mutation(axes: Axes, start: int, last: int) -> None:
 
 def draw_evolution(case: Case, identifications: Path, histories: Path) -> Figure:
     """Draw every parameter over generations for all seeds, highlighting a run of each basin."""
-    method = case.study.shown_method
-    found = read_identifications(identifications, case, method.name)
-    first = first_of_basins(found, case.study.near_noise_tolerance)
-    shown = [int(run["seed"]) for run in first.values()]
     parameters, identified = case.sample.model.parameters, case.published.identified
     columns = [parameter.column for parameter in parameters]
-    history = read_history(histories, method.name, shown, columns)
-    drawn = figure(COLUMN_IN, 1.2 + 1.5 * (rows := -(-len(parameters) // 2)))
+    found, first, shown, history = _runs(case, identifications, histories, columns)
+    drawn = style.figure(style.COLUMN_IN, 1.2 + 1.5 * (rows := -(-len(parameters) // 2)))
     grid = drawn.subplots(rows, 2, sharex=True).ravel()
     for axes, parameter in zip(grid, parameters, strict=False):
         for seed, rows in history.groupby("seed"):
-            style = _line_of_seed(seed, shown, 0.6)
-            axes.step(rows["generation"], rows[parameter.column], where="post", **style)
+            look = _line_of_seed(seed, shown, 0.6)
+            axes.step(rows["generation"], rows[parameter.column], where="post", **look)
         target = case.parameters.get(parameter.name, 0)
         if target > 0:
-            axes.axhline(target, color=TARGET, linestyle="--")
+            axes.axhline(target, color=style.TARGET, linestyle="--")
         if parameter.name in identified:
-            axes.axhline(identified[parameter.name], color=PAPER, linestyle=":")
+            axes.axhline(identified[parameter.name], color=style.PAPER, linestyle=":")
         if np.any(history[parameter.column] > 0):
             axes.set_yscale("log")
         axes.set_ylabel(with_unit(parameter.symbol, parameter.unit))
@@ -146,15 +142,14 @@ def draw_evolution(case: Case, identifications: Path, histories: Path) -> Figure
     for axes in grid[len(parameters) :]:
         axes.set_axis_off()
     for axes in grid[len(parameters) - 2 : len(parameters)]:
-        axes.set_xlabel(method.step)
+        axes.set_xlabel(case.study.shown_method.step)
         axes.tick_params(labelbottom=True)
     _name_seeds(grid[0], len(found), first)
     if case.parameters:
-        grid[0].plot([], [], color=TARGET, linestyle="--", label="target")
+        grid[0].plot([], [], color=style.TARGET, linestyle="--", label="target")
     if identified:
-        grid[0].plot([], [], color=PAPER, linestyle=":", label="identified in the paper")
-    handles, labels = grid[0].get_legend_handles_labels()
-    drawn.legend(handles, labels, loc="outside lower center", ncols=2)
+        grid[0].plot([], [], color=style.PAPER, linestyle=":", label="identified in the paper")
+    drawn.legend(*grid[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     drawn.suptitle(case.title, x=0.01, ha="left", fontsize=8)
     return drawn
 
@@ -162,9 +157,9 @@ def draw_evolution(case: Case, identifications: Path, histories: Path) -> Figure
 def draw_waterfall(case: Case, identifications: Path) -> Figure:
     """Draw sorted increases of chi-squared, of every method's runs and of best encodable points."""
     found = read_identifications(identifications, case)
-    increase = np.maximum(chi_square_increase(found, case.samples), _LOWEST)
-    reached = reached_encodable(found, case.samples, case.study.optimum_tolerance)
-    drawn = figure(COLUMN_IN, 3.5)
+    increase = np.maximum(chi_square_increase(found, len(case.times_s)), _LOWEST)
+    reached = reached_encodable(found, len(case.times_s), case.study.optimum_tolerance)
+    drawn = style.figure(style.COLUMN_IN, 3.5)
     axes = drawn.subplots()
     methods = found["method"].unique()
     # Where curves coincide each is seen beside the thinner ones on top of it.
@@ -174,9 +169,9 @@ def draw_waterfall(case: Case, identifications: Path) -> Figure:
         mine = np.sort(increase[runs])
         place = 100 * (np.arange(len(mine)) + 0.5) / len(mine)
         label = f"{method.title}: {share_in_words(int(reached[runs].sum()), len(mine))}"
-        axes.plot(place, mine, label=label, linewidth=width, **line_of(method))
-    least = np.sort(chi_square_increase(found, case.samples, ENCODABLE)[runs]).clip(_LOWEST)
-    axes.plot(place, least, "--", color=TARGET, linewidth=0.8, label="best encodable point")
+        axes.plot(place, mine, label=label, linewidth=width, **style.line_of(method))
+    least = np.sort(chi_square_increase(found, len(case.times_s), ENCODABLE)[runs]).clip(_LOWEST)
+    axes.plot(place, least, "--", color=style.TARGET, linewidth=0.8, label="best encodable point")
     axes.set(yscale="log", ylim=(_LOWEST / 2, 5 * float(increase.max())))
     ticks = [tick for tick in 10.0 ** np.arange(-3, 7) if tick < axes.get_ylim()[1]]
     axes.set_yticks(ticks, [f"≤{_LOWEST:g}", *(f"{tick:g}" for tick in ticks[1:])])
@@ -201,31 +196,26 @@ def draw_scatter(
     case: Case, identifications: Path, target: Path, expected: Path, calibrated: list[Path]
 ) -> Figure:
     """Draw identified over target for every quantity and method."""
-    items = read_verdicts(expected)["quantities"]
-    verdicts = {item["quantity"]: item["verdict"] for item in items}
+    verdicts = {it["quantity"]: it["verdict"] for it in read_verdicts(expected)["quantities"]}
     found = read_identifications(identifications, case)
-    experiment = case.experiment.calibrated(calibrated)
-    time_s, _, rotation = read_target(target, case.times_s)
-    log_truth = experiment.logs(case.parameters)
-    _, sensitivity = experiment.of(time_s, rotation).residuals(log_truth)
-    noise_sd = standard_deviation(rotation, case.noise)
-    quantities = parameters_and_sum(experiment.searched)
-    drawn, grid = row_of_panels(len(quantities), 3.1)
-    for index, (axes, quantity) in enumerate(zip(grid, quantities, strict=True)):
-        names = [experiment.searched.parameters[i] for i in quantity.members]
+    bounds = bounds_at_truth(case, target, calibrated)
+    drawn, grid = style.row_of_panels(len(bounds), 3.1)
+    for index, (axes, (quantity, limit)) in enumerate(zip(grid, bounds, strict=True)):
+        names = [case.experiment.searched.parameters[i] for i in quantity.members]
         value = sum(case.parameters[p.name] for p in names)
         if value == 0:
             axes.axis("off")
             continue
         ratios = found[[p.column for p in names]].sum(axis=1) / value
-        limit = bound(sensitivity, noise_sd, log_truth, quantity)
         verdict = verdicts[quantity.label]
         # The bound is a tangent at the truth: no use if the quantity is not determined, or if it
         # is zero.
         known = limit if limit and verdict == DETERMINED else np.inf
         _quantity(axes, case, found["method"], ratios.to_numpy(float), known)
-        _paper(axes, case.published.identified, [p.name for p in names], value)
-        panel(axes, "abcdefghijklmnopqrstuvwxyz"[index], _title(quantity, known, verdict), 60)
+        if {p.name for p in names} <= {*(printed := case.published.identified)}:
+            ratio = np.clip(sum(printed[p.name] for p in names) / value, *axes.get_ylim())
+            axes.axhline(ratio, color=style.PAPER, linewidth=1.2, linestyle=(0, (4, 2)))
+        style.panel(axes, "abcdefghijklmnopqrstuvwxyz"[index], _title(quantity, known, verdict), 60)
         if index == 0:
             axes.set_ylabel("identified / target")
     _legend(drawn, case, list(found["method"].unique()), found["seed"].nunique())
@@ -248,18 +238,18 @@ def _quantity(
         shown = mine[:SHOWN_SEEDS]
         # A fixed sideways scatter keeps points apart.
         x = place + 0.6 * ((np.arange(len(shown)) * 0.618034) % 1 - 0.5)
-        style = _DOTS | {"color": line_of(case.study.identifiers[name])["color"]}
+        look = _DOTS | {"color": style.line_of(case.study.identifiers[name])["color"]}
         points, ends = np.column_stack([x, shown]), ((-np.inf, bottom), (np.inf, top))
-        points_within(axes, points, *ends, style, edge_size=3)
+        style.points_within(axes, points, *ends, look, edge_size=3)
         low, middle, high = np.clip(quartiles[place], bottom, top)
-        axes.plot([place, place], [low, high], color=TARGET, linewidth=1.0)
-        axes.plot([place - 0.3, place + 0.3], [middle, middle], color=TARGET, linewidth=1.4)
+        axes.plot([place, place], [low, high], color=style.TARGET, linewidth=1.0)
+        axes.plot([place - 0.3, place + 0.3], [middle, middle], color=style.TARGET, linewidth=1.4)
     if np.isfinite(limit):
         half = NormalDist().inv_cdf((1 + case.confidence) / 2) * limit
         # Of the logarithm, straight where the axis is.
         low, high = (np.exp(-half), np.exp(half)) if loose else (1 - half, 1 + half)
-        axes.axhspan(low, high, color=SHADE, zorder=0, linewidth=0)
-    axes.axhline(1, color=TARGET, linewidth=0.6)
+        axes.axhspan(low, high, color=style.SHADE, zorder=0, linewidth=0)
+    axes.axhline(1, color=style.TARGET, linewidth=0.6)
     if loose:
         axes.set_yscale("log")
         axes.yaxis.set_major_locator(LogLocator(numticks=5))
@@ -268,13 +258,6 @@ def _quantity(
         axes.yaxis.set_major_locator(MaxNLocator(5))
     axes.set(ylim=(bottom, top), xlim=(-0.6, len(names) - 0.4))
     axes.set_xticks([])
-
-
-def _paper(axes: Axes, identified: Mapping[str, float], names: list[str], target: float) -> None:
-    if all(name in identified for name in names):
-        low, high = axes.get_ylim()
-        value = float(np.clip(sum(identified[name] for name in names) / target, low, high))
-        axes.axhline(value, color=PAPER, linewidth=1.2, linestyle=(0, (4, 2)))
 
 
 def _title(quantity: Quantity, limit: float, verdict: str) -> str:
@@ -287,13 +270,13 @@ def _legend(drawn: Figure, case: Case, methods: list[str], seeds: int) -> None:
     marks = [(case.study.identifiers[name].title, "o", name) for name in methods]
     handles: list[Any] = []
     for label, marker, name in [*marks, ("beyond the axis", "^", "")]:
-        color = line_of(case.study.identifiers[name])["color"] if name else TARGET
-        style: dict[str, Any] = {"color": color, "markersize": 4, "markeredgewidth": 0}
-        handles += axes.plot([], [], marker, label=label, **style)
+        color = style.line_of(case.study.identifiers[name])["color"] if name else style.TARGET
+        look: dict[str, Any] = {"color": color, "markersize": 4, "markeredgewidth": 0}
+        handles += axes.plot([], [], marker, label=label, **look)
     label = f"{100 * case.confidence:g} % by the Cramér-Rao bound (named above), rest known"
-    handles.append(axes.fill([], [], color=SHADE, label=label)[0])
+    handles.append(axes.fill([], [], color=style.SHADE, label=label)[0])
     if case.published.identified:
-        handles += axes.plot([], [], color=PAPER, linestyle=(0, (4, 2)), label="paper")
+        handles += axes.plot([], [], color=style.PAPER, linestyle=(0, (4, 2)), label="paper")
     drawn.legend(handles=handles, loc="outside lower left", ncols=3)
     few = "" if seeds <= SHOWN_SEEDS else f": {seeds_in_words(seeds)}, quartiles of all"
     drawn.suptitle(case.title + few, x=0.01, ha="left", fontsize=8)

@@ -1,6 +1,6 @@
 """Figures 9, 11 and 12: target, noisy trace, fits, and the residuals; and the force of the jaws."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,33 +12,14 @@ from matplotlib.figure import Figure
 
 from biogrip.arrays import Array
 from biogrip.digits import with_unit
-from biogrip.errors import BiogripError
-from biogrip.figures.style import (
-    BLACK,
-    BLUE,
-    COLUMN_IN,
-    FITTED,
-    MEASURED,
-    ORANGE,
-    RUNS,
-    TARGET,
-    figure,
-    is_over_decades,
-    literal,
-)
+from biogrip.figures import style
 from biogrip.fit.experiment import Experiment
 from biogrip.physics.instruments import INSTRUMENTS, ROTATION, Channel
 from biogrip.physics.noise import within
 from biogrip.physics.protocol import is_storage
 from biogrip.physics.simulation import jaw_force, simulated_response
 from biogrip.physics.unilateral import UnilateralResponse, unilateral_response
-from biogrip.records.identifications import (
-    ALL,
-    basins,
-    read_histories,
-    read_identifications,
-    read_verdicts,
-)
+from biogrip.records.identifications import ALL, basins, read_identifications, read_verdicts
 from biogrip.records.rows import seeds_of
 from biogrip.records.traces import Measurements, read_measurements, read_target
 from biogrip.stages.identification import TRACE, experiment_for
@@ -85,25 +66,36 @@ def fits_of_basins(
     for words, run in first_of_basins(found, case.study.near_noise_tolerance).items():
         seed = int(run["seed"])
         values = {p.name: float(run[p.column]) for p in case.sample.model.parameters}
-        recorded = read_measurements(_holding(seed, measurements), [seed])
+        holding = next(path for path in measurements if seed in seeds_of(path.stem))
+        recorded = read_measurements(holding, [seed])
         experiment = experiment_for(case.experiment, recorded, calibrated)
-        fits[f"fit ({words})"] = fit_of(experiment, values, recorded, seed)
+        fits[f"fit ({words})"] = _fit_of_seed(experiment, values, recorded, seed)
     return fits
 
 
 def fit_of(
-    problem: Experiment, parameters: Mapping[str, float], recorded: Measurements, seed: int
+    problem: Experiment,
+    parameters: Mapping[str, float],
+    time_s: Array,
+    measured: Array,
+    sd: Array | None = None,
+    target: Array | None = None,
 ) -> Fit:
-    """Return the trace of a seed, and the response of parameters with nuisance terms fitted."""
-    network = problem.model.sample(parameters)
-    simulated = simulated_response(
-        problem.gripper, network, problem.torque, recorded.time_s, nonlinear=False
-    )[0]
-    measured = recorded.readings[seed]
-    nuisance = problem.nuisance(recorded.time_s)
-    fitted = simulated + within(nuisance, measured - simulated, recorded.sd)
-    target, read = recorded.target, problem.instrument.read
-    return Fit(recorded.time_s, target, measured, fitted, recorded.sd, read)
+    """Return a trace, and the response of parameters with nuisance terms fitted.
+
+    Fixed parameters need not be given.
+    """
+    network = problem.model.sample({**parameters, **problem.fixed})
+    device = problem.gripper, network, problem.torque
+    simulated = simulated_response(*device, time_s, nonlinear=False)[0]
+    fitted = simulated + within(problem.nuisance(time_s), measured - simulated, sd)
+    return Fit(time_s, target, measured, fitted, sd, problem.instrument.read)
+
+
+def _fit_of_seed(
+    problem: Experiment, parameters: Mapping[str, float], made: Measurements, seed: int
+) -> Fit:
+    return fit_of(problem, parameters, made.time_s, made.readings[seed], made.sd, made.target)
 
 
 def first_seeds(found: pd.DataFrame) -> pd.DataFrame:
@@ -116,14 +108,6 @@ def seeds_in_words(count: int) -> str:
     if count == 1:
         return "the only trace"
     return f"all {count} seeds" if count <= SHOWN_SEEDS else f"first {SHOWN_SEEDS} of {count} seeds"
-
-
-def read_history(
-    path: Path, method: str, shown: Sequence[int], values: Sequence[str] = ("best_misfit",)
-) -> pd.DataFrame:
-    """Read one method's histories of the seeds drawn individually and of those shown."""
-    found = read_histories(path, method, values)
-    return found[found["seed"].isin({*range(SHOWN_SEEDS), *shown})]
 
 
 def scale_of(values: Array, unit: str) -> tuple[float, str]:
@@ -139,13 +123,6 @@ def scale_of_fit(fit: Fit) -> tuple[float, str]:
     """Return factor and unit with a prefix, where the unit of the readings may have one."""
     plain = fit.read.unit.isalpha()
     return scale_of(fit.fitted, fit.read.unit) if plain else (1.0, fit.read.unit)
-
-
-def _holding(seed: int, measurements: list[Path]) -> Path:
-    for path in measurements:
-        if seed in seeds_of(path.stem):
-            return path
-    raise BiogripError(f"no measurement file holds seed {seed}.")
 
 
 _READINGS: dict[str, Any] = {"linestyle": "", "marker": ".", "markersize": 1.2, "rasterized": True}
@@ -177,20 +154,21 @@ def judged_fit(
     recorded = read_measurements(measurements, [TRACE])
     experiment = experiment_for(case.experiment, recorded, calibrated)
     found = {item["quantity"]: item["value"] for item in verdicts["quantities"]}
-    values = {name: found[name] for name in experiment.searched.names}
-    return fit_of(experiment, {**experiment.fixed, **values}, recorded, TRACE)
+    return _fit_of_seed(experiment, found, recorded, TRACE)
 
 
 def draw_traces(axes: Axes, fits: Mapping[str, Fit]) -> tuple[float, str]:
     """Draw a trace, its target, its fit and others, by label; return factor and unit."""
     fit = next(iter(fits.values()))
     factor, unit = scale_of_fit(fit)
-    axes.plot(fit.time_s, factor * fit.measured, color=MEASURED, **_readings(len(fit.time_s)))
+    axes.plot(fit.time_s, factor * fit.measured, color=style.MEASURED, **_readings(len(fit.time_s)))
     kind = "recorded trace" if fit.target is None else "noisy measurement"
-    axes.plot([], [], ".", color=MEASURED, markersize=4, label=kind)
+    axes.plot([], [], ".", color=style.MEASURED, markersize=4, label=kind)
     if fit.target is not None:
-        axes.plot(fit.time_s, factor * fit.target, color=TARGET, linewidth=2.4, label="target")
-    for (label, each), color in zip(fits.items(), RUNS, strict=False):
+        axes.plot(
+            fit.time_s, factor * fit.target, color=style.TARGET, linewidth=2.4, label="target"
+        )
+    for (label, each), color in zip(fits.items(), style.RUNS, strict=False):
         axes.plot(each.time_s, factor * each.fitted, color=color, label=label)
     axes.set_ylabel(with_unit(fit.read.title, unit))
     return factor, unit
@@ -208,7 +186,7 @@ def _means(axes: Axes, time_s: Array, residual: Array) -> None:
     times, parts = np.array_split(time_s, _PARTS), np.array_split(residual, _PARTS)
     error = [part.std(ddof=1) / np.sqrt(len(part)) for part in parts]
     at, mean = [part.mean() for part in times], [part.mean() for part in parts]
-    axes.errorbar(at, mean, error, fmt="o", color=BLUE, markersize=2, linewidth=0.8, zorder=3)
+    axes.errorbar(at, mean, error, fmt="o", color=style.BLUE, markersize=2, linewidth=0.8, zorder=3)
 
 
 def draw_fit(fits: Mapping[str, Fit], title: str, axis_rad: tuple[float, ...] = ()) -> Figure:
@@ -219,30 +197,30 @@ def draw_fit(fits: Mapping[str, Fit], title: str, axis_rad: tuple[float, ...] = 
     fit, *others = fits.values()
     if INSTRUMENTS[fit.read.name].sweeps:
         return draw_sweep(fit, title)
-    drawn = figure(COLUMN_IN, 3.6)
+    drawn = style.figure(style.COLUMN_IN, 3.6)
     traces, residuals = drawn.subplots(2, 1, sharex=True, height_ratios=[2.4, 1])
     factor, unit = draw_traces(traces, fits)
     low, high = (end([*axis_rad, end(fit.measured)]) for end in (np.min, np.max))
     margin = 0.02 * (high - low)
     traces.set_ylim(factor * (low - margin), factor * (high + margin))
     drawn.legend(loc="outside upper left", ncols=2)
-    traces.set_title(literal(title))
+    traces.set_title(style.literal(title))
     residual = fit.measured - fit.fitted
     residual = factor * residual if fit.sd is None else residual / fit.sd
-    residuals.plot(fit.time_s, residual, color=MEASURED, **_readings(len(residual)))
+    residuals.plot(fit.time_s, residual, color=style.MEASURED, **_readings(len(residual)))
     if fit.target is not None:
-        residuals.plot(fit.time_s, factor * (fit.target - fit.fitted), color=TARGET)
-    for other, color in zip(others, RUNS[1:], strict=False):
+        residuals.plot(fit.time_s, factor * (fit.target - fit.fitted), color=style.TARGET)
+    for other, color in zip(others, style.RUNS[1:], strict=False):
         left = factor * (np.asarray(other.target) - other.fitted)
         residuals.plot(other.time_s, left, color=color)
     _means(residuals, fit.time_s, residual)
-    residuals.axhline(0, color=FITTED, linewidth=0.8)
+    residuals.axhline(0, color=style.FITTED, linewidth=0.8)
     bound = 1.15 * float(np.max(np.abs(residual)))
     residuals.set_ylim(-bound, bound)
     residuals.set_ylabel(with_unit("residual", unit) if fit.sd is None else "residual / sd")
     residuals.set_xlabel("time (s)")
     residuals.set_xlim(fit.time_s[0], fit.time_s[-1])
-    if is_over_decades(fit.time_s):
+    if style.is_over_decades(fit.time_s):
         residuals.set_xscale("log")
         if low > 0:
             traces.set(yscale="log", ylim=(0.8 * factor * low, 1.25 * factor * high))
@@ -252,23 +230,23 @@ def draw_fit(fits: Mapping[str, Fit], title: str, axis_rad: tuple[float, ...] = 
 
 def draw_sweep(fit: Fit, title: str) -> Figure:
     """Draw both moduli of a sweep, their fit, and the residuals in percent of it."""
-    drawn = figure(COLUMN_IN, 3.6)
+    drawn = style.figure(style.COLUMN_IN, 3.6)
     moduli, residuals = drawn.subplots(2, 1, sharex=True, height_ratios=[2.4, 1])
-    storage, style = is_storage(fit.time_s), {"linestyle": "", "markersize": 3}
+    storage, look = is_storage(fit.time_s), {"linestyle": "", "markersize": 3}
     for name, of, marker, face in (
-        ("storage", storage, "o", BLUE),
+        ("storage", storage, "o", style.BLUE),
         ("loss", ~storage, "s", "white"),
     ):
-        color = BLUE if name == "storage" else FITTED
-        points: dict[str, Any] = style | {"marker": marker, "color": color, "markerfacecolor": face}
+        color = style.BLUE if name == "storage" else style.FITTED
+        points: dict[str, Any] = look | {"marker": marker, "color": color, "markerfacecolor": face}
         omega, residual = np.abs(fit.time_s[of]), 100 * (fit.measured / fit.fitted - 1)[of]
         moduli.plot(omega, fit.measured[of], **points, label=f"{name} modulus")
         moduli.plot(omega, fit.fitted[of], "--", color=color, label=f"{name}, best fit")
         residuals.plot(omega, residual, **points)
-    moduli.set(xscale="log", yscale="log", title=literal(title))
+    moduli.set(xscale="log", yscale="log", title=style.literal(title))
     moduli.set_ylabel(with_unit("modulus", fit.read.unit))
     drawn.legend(loc="outside upper left", ncols=2)
-    residuals.axhline(0, color=MEASURED, linestyle="--", linewidth=0.8)
+    residuals.axhline(0, color=style.MEASURED, linestyle="--", linewidth=0.8)
     residuals.set(xlabel="angular frequency (rad/s)", ylabel="residual (%)")
     drawn.align_ylabels()
     return drawn
@@ -280,23 +258,23 @@ def draw_force(case: Case, target: Path) -> Figure:
     device = case.gripper, case.network, case.torque
     # Without inertia, since the jaws ring for less than a sampling interval after a step.
     sticking = jaw_force(*device, time_s, nonlinear=case.nonlinear_target, inertia=False)[0]
-    drawn = figure(COLUMN_IN, 3.2)
+    drawn = style.figure(style.COLUMN_IN, 3.2)
     forces, rotations = drawn.subplots(2, 1, sharex=True, height_ratios=[1.25, 1])
     factor, unit = scale_of(sticking, "N")
-    forces.axhline(0, color=BLACK, linewidth=0.6)
-    forces.plot(time_s, factor * sticking, color=BLUE, label="jaws that hold the sample")
+    forces.axhline(0, color=style.BLACK, linewidth=0.6)
+    forces.plot(time_s, factor * sticking, color=style.BLUE, label="jaws that hold the sample")
     negative = np.minimum(factor * sticking, 0)
     pulling = bool(negative.min() < -1e-9 * factor * np.abs(sticking).max())
     if pulling:
         forces.fill_between(
-            time_s, negative, 0, color=ORANGE, alpha=0.35, linewidth=0, hatch="////",
+            time_s, negative, 0, color=style.ORANGE, alpha=0.35, linewidth=0, hatch="////",
             label="the jaws would have to pull",
         )  # fmt: skip
     apart = None
     if pulling and not case.nonlinear_target:
         apart = unilateral_response(*device, time_s)
         shown = _from_loss(apart, apart.jaw_force_N)
-        forces.plot(time_s, factor * shown, "--", color=ORANGE, label="jaws that let go")
+        forces.plot(time_s, factor * shown, "--", color=style.ORANGE, label="jaws that let go")
     forces.set_ylabel(f"jaw force ({unit})")
     low, high = float(negative.min()), factor * float(sticking.max())
     forces.set_ylim(low - 0.08 * (high - low), high + (0.62 if apart else 0.42) * (high - low))
@@ -305,10 +283,10 @@ def draw_force(case: Case, target: Path) -> Figure:
 
     factor, unit = scale_of(rotation, "rad")
     name = "target" + (", jaws that let go" if case.unilateral else "")
-    rotations.plot(time_s, factor * rotation, color=BLACK, label=name)
+    rotations.plot(time_s, factor * rotation, color=style.BLACK, label=name)
     if apart and not case.unilateral:
         shown = _from_loss(apart, apart.rotation[0])
-        rotations.plot(time_s, factor * shown, "--", color=ORANGE, label="jaws that let go")
+        rotations.plot(time_s, factor * shown, "--", color=style.ORANGE, label="jaws that let go")
     rotations.set_ylabel(f"rotation ({unit})")
     low, high = (factor * float(end) for end in (min(rotation.min(), 0), rotation.max()))
     rotations.set_ylim(low, high + 0.4 * (high - low))

@@ -16,21 +16,8 @@ from scipy.interpolate import PchipInterpolator
 
 from biogrip.arrays import Array
 from biogrip.digits import SUPERSCRIPTS, with_unit
+from biogrip.figures import style
 from biogrip.figures.fit import first_seeds, seeds_in_words
-from biogrip.figures.style import (
-    BLUE,
-    COLUMN_IN,
-    FITTED,
-    GREY,
-    PAPER,
-    SHADE,
-    TARGET,
-    figure,
-    literal,
-    panel,
-    points_within,
-    row_of_panels,
-)
 from biogrip.judging.levels import CERTAIN
 from biogrip.records.identifications import read_identifications, read_verdicts
 from biogrip.study.study import Case
@@ -55,31 +42,30 @@ def draw_profiles_of(
     """Draw profiles of verdicts, beside others that are expected and true parameters."""
     foreseen = {item["quantity"]: item for item in others[0]["quantities"]} if others else {}
     quantities = found["quantities"]
-    drawn, grid = row_of_panels(len(quantities), 2.5, sharey=True)
+    drawn, grid = style.row_of_panels(len(quantities), 2.5, sharey=True)
     for index, (axes, item) in enumerate(zip(grid, quantities, strict=True)):
         if item["quantity"] in foreseen:
             curve = _curve(foreseen[item["quantity"]]["profile"])
-            axes.plot(*curve, color=GREY, label="expected without noise")
+            axes.plot(*curve, color=style.GREY, label="expected without noise")
         draw_profile(axes, item)
-        for increase, style, label in (
+        for increase, look, label in (
             (found["threshold"], "--", f"{100 * found['confidence']:g} %"),
             (found["certainty"], ":", f"{100 * CERTAIN:g} %, to close a side"),
         ):
-            axes.axhline(increase, color=TARGET, linestyle=style, linewidth=0.7, label=label)
+            axes.axhline(increase, color=style.TARGET, linestyle=look, linewidth=0.7, label=label)
         truth = target_of(item["quantity"], truth_of or {})
         if truth is not None:
-            axes.axvline(truth, color=TARGET, linewidth=0.7, label="truth")
-        panel(axes, ascii_letters[index], item["verdict"], 40)
+            axes.axvline(truth, color=style.TARGET, linewidth=0.7, label="truth")
+        style.panel(axes, ascii_letters[index], item["verdict"], 40)
     grid[0].set_ylabel("rise of χ²")
-    handles, labels = grid[0].get_legend_handles_labels()
-    drawn.legend(handles, labels, loc="outside lower right", ncols=5)
-    drawn.suptitle(literal(title), x=0.01, ha="left", fontsize=8)
+    drawn.legend(*grid[0].get_legend_handles_labels(), loc="outside lower right", ncols=5)
+    drawn.suptitle(style.literal(title), x=0.01, ha="left", fontsize=8)
     return drawn
 
 
 def draw_profile(axes: Axes, item: Mapping[str, Any]) -> None:
     """Draw the profile of a quantity's verdict, with its limits."""
-    axes.plot(*_curve(item["profile"]), color=FITTED, label="this trace")
+    axes.plot(*_curve(item["profile"]), color=style.FITTED, label="this trace")
     _limits(axes, item)
     low, high = _profile_limits(item)
     if high / low > _WIDE:
@@ -136,10 +122,10 @@ def _limits(axes: Axes, item: Mapping[str, Any]) -> None:
         ends = [low or values[0], *(end for gap in item["excluded"] for end in gap)]
         ends.append(high or values[-1])
         for start, end in zip(ends[::2], ends[1::2], strict=True):
-            axes.axvspan(start, end, color=SHADE, zorder=0, linewidth=0)
+            axes.axvspan(start, end, color=style.SHADE, zorder=0, linewidth=0)
     for limit in (low, high):
         if limit is not None:
-            axes.axvline(limit, color=BLUE, linewidth=0.7)
+            axes.axvline(limit, color=style.BLUE, linewidth=0.7)
 
 
 _LEVELS = [0.0, 1.0, 3.84, 10.83, 30.0, 100.0, 300.0, 1000.0]
@@ -150,15 +136,15 @@ _DEEP, _AROUND, _FARTHEST, _LEAST = 10.83, 0.12, 1.15, 0.02
 # Not in layout: it would reserve room for labels of points.
 _POINTS: dict[str, Any] = {"linestyle": "", "clip_on": False, "in_layout": False}
 _FITS = _POINTS | {
-    "color": FITTED, "marker": "o", "markersize": 2.5, "markeredgewidth": 0, "alpha": 0.8
+    "color": style.FITTED, "marker": "o", "markersize": 2.5, "markeredgewidth": 0, "alpha": 0.8
 }  # fmt: skip
 # Open markers below the truth, since both may coincide.
 _THE_PAPERS = _POINTS | {
-    "color": PAPER, "marker": "D", "markersize": 6, "markerfacecolor": "none",
+    "color": style.PAPER, "marker": "D", "markersize": 6, "markerfacecolor": "none",
     "markeredgewidth": 1.4, "zorder": 4,
 }  # fmt: skip
 _TRUE = _POINTS | {
-    "color": TARGET, "marker": "*", "markersize": 7, "markeredgecolor": "white",
+    "color": style.TARGET, "marker": "*", "markersize": 7, "markeredgecolor": "white",
     "markeredgewidth": 0.6, "zorder": 5,
 }  # fmt: skip
 
@@ -169,7 +155,7 @@ def draw_valley(case: Case, measured: Path, identifications: Path) -> Figure:
     valley = found["valley"]
     x, y = valley["x"], valley["y"]
     identified = read_identifications(identifications, case, case.study.fitting_method.name)
-    drawn = figure(COLUMN_IN, 3.1)
+    drawn = style.figure(style.COLUMN_IN, 3.1)
     axes = drawn.subplots()
     colours = colormaps["cividis_r"](np.linspace(0, 0.95, len(_LEVELS)))
     shown = []
@@ -181,13 +167,15 @@ def draw_valley(case: Case, measured: Path, identifications: Path) -> Figure:
         shown += [path.vertices for path in filled.get_paths()[: _LEVELS.index(_DEEP)]]
     total = sum(valley["best"])
     label = f"{x['symbol']} + {y['symbol']} = {total:.3g} {x['unit']}"
-    axes.plot([0, total], [total, 0], color=TARGET, linewidth=0.8, linestyle="--", label=label)
+    axes.plot(
+        [0, total], [total, 0], color=style.TARGET, linewidth=0.8, linestyle="--", label=label
+    )
     columns = [f"{item['name']}_Ns_per_m" for item in (x, y)]
     label = f"{case.study.fitting_method.title}, {seeds_in_words(len(identified))}"
     marked = [(first_seeds(identified)[columns].to_numpy(float), _FITS, label)]
     marked += [
-        (np.array([[place[x["name"]], place[y["name"]]]]), style, name)
-        for place, style, name in (
+        (np.array([[place[x["name"]], place[y["name"]]]]), look, name)
+        for place, look, name in (
             (case.published.identified, _THE_PAPERS, "paper"),
             (case.parameters, _TRUE, "truth"),
         )
@@ -195,9 +183,9 @@ def draw_valley(case: Case, measured: Path, identifications: Path) -> Figure:
     ]
     places = [np.array([valley["best"]]), *(points for points, *_ in marked)]
     low, high = _window(np.concatenate([*shown, *places]), total)
-    for points, style, name in marked:
+    for points, look, name in marked:
         labels = (name, "beyond the axis")
-        points_within(axes, points, (0, 0), high, style, edge_size=4.5, labels=labels)
+        style.points_within(axes, points, (0, 0), high, look, edge_size=4.5, labels=labels)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), title=case.title)
     axes.set_xlabel(with_unit(x["symbol"], x["unit"]))
     axes.set_ylabel(with_unit(y["symbol"], y["unit"]))

@@ -144,18 +144,17 @@ def points_within(
 
 def save(drawn: Figure, output: Path, *prints: Path) -> None:
     """Write a figure as PNG, and as PDF for print; without dates, so that both are reproducible."""
-    png = BytesIO()
-    save_png(drawn, png)
     with atomic_write(output) as scratch:
-        scratch.write_bytes(in_few_colours(png, 256))
+        scratch.write_bytes(png_of(drawn, 256))
     for file in prints:
         with atomic_write(file) as scratch:
             drawn.savefig(scratch, format="pdf", metadata={"CreationDate": None, "Creator": None})
 
 
-def in_few_colours(png: BinaryIO, colours: int) -> bytes:
-    """Return a PNG with at most so many colours: it is half as large, or less."""
-    few = BytesIO()
+def png_of(drawn: Figure, colours: int) -> bytes:
+    """Return a figure as PNG of at most so many colours: it is half as large, or less."""
+    png, few = BytesIO(), BytesIO()
+    save_png(drawn, png)
     with PIL.Image.open(png) as image:
         flat = image.convert("RGB").quantize(colours, dither=PIL.Image.Dither.NONE)
         flat.save(few, "png", dpi=image.info["dpi"])

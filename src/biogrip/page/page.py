@@ -1,26 +1,32 @@
 """The pages of a study, self-contained HTML: the report, and what one trace of a case tells."""
 
 import base64
+import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from html import escape
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import jinja2
 import PIL.Image
 
 from biogrip import __version__
-from biogrip.digits import legible
+from biogrip.digits import legible, significant, with_unit
 from biogrip.errors import BiogripError
+from biogrip.figures.fit import scale_of
 from biogrip.files import write_text
 from biogrip.page import answers
-from biogrip.page.sliders import has_sliders, slid
+from biogrip.physics.noise import rms
 from biogrip.records.identifications import read_verdicts
 from biogrip.records.rows import read_table, whole
+from biogrip.records.traces import read_measurements
+from biogrip.stages.identification import TRACE
 from biogrip.study.study import Case, Study
 from biogrip.tables.cases import target_of
+from biogrip.terminal import visible
 
 # Characters left for images in a report of at most 8 MB.
 _MOST_PICTURE_LETTERS = 2_800_000
@@ -43,18 +49,29 @@ _QUESTION = "How well can a MEMS microgripper identify the viscoelastic paramete
 _MOST_TITLES = 3
 # The paper's figure of its first fit, between those of its convergence and of its evolution.
 _FIRST_FIT = 9
+# Parameters that have a slider.
+_SLID = "k", "k_p", "c", "c_p"
+# As many readings as a curve of a few hundred pixels shows.
+_MOST_READINGS = 800
+# More digits than a screen shows, and fewer than those in which processors differ.
+_DIGITS = 6
+# How far a slider goes below the least and above the largest parameter.
+_BEYOND = 10.0
 _SYMBOL = re.compile(r"\b([kc])_(\w)\b")
 
-_TEMPLATES = jinja2.Environment(
+TEMPLATES = jinja2.Environment(
     loader=jinja2.FileSystemLoader(Path(__file__).parent),
     autoescape=True,
     trim_blocks=True,
     lstrip_blocks=True,
     undefined=jinja2.StrictUndefined,
 )
-_TEMPLATES.filters["legible"] = legible
-_TEMPLATES.filters["symbols"] = lambda text: _SYMBOL.sub(r"<i>\1</i><sub>\2</sub>", escape(text))
-_TEMPLATES.globals |= {"target_of": target_of} | {
+TEMPLATES.filters |= {
+    "legible": legible,
+    "visible": visible,
+    "symbols": lambda text: _SYMBOL.sub(r"<i>\1</i><sub>\2</sub>", escape(text)),
+}
+TEMPLATES.globals |= {"target_of": target_of} | {
     name: Path(__file__).with_name(file).read_text(encoding="utf-8")
     for name, file in (("style", "report.css"), ("script", "sliders.js"))
 }
@@ -106,7 +123,7 @@ def write_report(
     )
     tables: list[Entry] = []
     for path, csv in zip(files["tables"], files["downloads"], strict=True):
-        entry, download = entry_of(path, owners, texts), _url("text/csv", whole(csv).encode())
+        entry, download = entry_of(path, owners, texts), data_url("text/csv", whole(csv).encode())
         if entry.caption in (it.caption for it in tables):
             entry = replace(entry, caption="")
         tables.append(replace(entry, content=_table(path, titles), download=download))
@@ -125,11 +142,12 @@ def write_report(
     for entry in figures:
         if entry.file not in placed:
             folded.setdefault(owners.get(entry.whose, "The study"), []).append(entry)
-    found = [read_verdicts(path) for path in files["verdicts"]]
-    by_case = zip(cases, found, strict=True)
-    own = [it for case, it in by_case if case.recorded and not study.published]
+    found = [*zip(cases, map(read_verdicts, files["verdicts"]), strict=True)]
+    own = [it for case, it in found if case.recorded and not study.published]
     asked = compared, study.shown_method.title
     who = "Run again, the paper's" if study.published else "The"
+    every = [*titles.values()]
+    named = ", ".join(every) if len(every) <= _MOST_TITLES else f"{len(every)} samples"
     shown = {
         "sliders": slid(*movable[0]) if movable else None,
         "answers": [
@@ -141,12 +159,12 @@ def write_report(
         ],
         "compared": answers.rows_beside_the_paper(beside, titles)
         or answers.compared_rows(errors, judged, titles),
-        "cases": list(zip(cases, found, strict=True)),
+        "cases": found,
         "better": {
             case.name: answers.say_which_model_is_better(
                 models, case.name, case.sample.candidate, own["fit"]
             )
-            for case, own in zip(cases, found, strict=True)
+            for case, own in found
         },
         "told": told,
         "story": story,
@@ -154,29 +172,22 @@ def write_report(
         "evidence_tables": [it for it in tables if it.name in _EVIDENCE],
         "tables": [it for it in tables if it.name not in _EVIDENCE],
         "config": config,
-        "title": _title(study),
+        "title": _QUESTION if study.published else named,
         "paper": bool(study.published),
         "versions": {"biogrip": __version__, **{name: version(name) for name in _LIBRARIES}},
     }
     for file, template in ((page, "report"), (front, "answers")):
-        write_text(file, _TEMPLATES.get_template(f"{template}.html.j2").render(shown))
+        write_text(file, TEMPLATES.get_template(f"{template}.html.j2").render(shown))
 
 
 def write_summary(case: Case, verdicts: Path, figures: list[Path], page: Path) -> None:
     """Write what the judged trace of a case tells, with figures, PNG."""
-    text = _TEMPLATES.get_template("summary.html.j2").render(
+    text = TEMPLATES.get_template("summary.html.j2").render(
         case=case,
         found=read_verdicts(verdicts),
-        figures=[(path.stem, _url("image/png", path.read_bytes())) for path in figures],
+        figures=[(path.stem, data_url("image/png", path.read_bytes())) for path in figures],
     )
     write_text(page, text)
-
-
-def _title(study: Study) -> str:
-    """Return the paper's question, or the titles of the cases of another study."""
-    titles = [case.title for case in study.cases.values()]
-    named = ", ".join(titles) if len(titles) <= _MOST_TITLES else f"{len(titles)} samples"
-    return _QUESTION if study.published else named
 
 
 def _is_own(entry: Entry, study: Study) -> bool:
@@ -223,12 +234,12 @@ def _images(paths: Sequence[Path]) -> Iterator[tuple[str | None, tuple[int, int]
         # The latter, too, is Pillow's for what is no PNG.
         except (OSError, SyntaxError) as error:
             raise BiogripError(f"{path}: cannot be read: {error}.") from error
-        url = _url("image/png", path.read_bytes())
+        url = data_url("image/png", path.read_bytes())
         room -= len(url)
         yield url if room >= 0 else None, size
 
 
-def _url(kind: str, content: bytes) -> str:
+def data_url(kind: str, content: bytes) -> str:
     """Return a file as a data URL (RFC 2397)."""
     return f"data:{kind};base64,{base64.b64encode(content).decode()}"
 
@@ -244,3 +255,38 @@ def _table(path: Path, titles: Mapping[str, str]) -> str:
     if found is None:
         raise BiogripError(f"{path}: holds no table.")
     return re.sub("<td>(.*?)</td>", cell, found[0].replace("<th>", '<th scope="col">'))
+
+
+def has_sliders(case: Case) -> bool:
+    """Tell whether a case has the response of the script: one branch, equal arms, only steps."""
+    arms = case.experiment.gripper.left, case.experiment.gripper.right
+    simulated = case.instrument.has_jaws and not case.recorded
+    alone = {*case.parameters} == {*_SLID} and min(case.parameters.values()) > 0
+    return simulated and alone and arms[0] == arms[1] and not case.torque.changes[:, 1:].any()
+
+
+def slid(case: Case, measurements: Path) -> dict[str, Any]:
+    """Return a case's first trace, thinned, with its parameters, arm and steps, in SI units."""
+    recorded, gripper = read_measurements(measurements, [TRACE]), case.experiment.gripper
+    readings, target = recorded.readings[TRACE], recorded.target
+    assert target is not None
+    factor, unit = scale_of(readings, case.instrument.read.unit)
+    stride = -(-len(readings) // _MOST_READINGS)
+    values = case.parameters.values()
+    return {
+        "title": case.title,
+        "noise": f"{factor * rms((readings - target)[::stride]):.4g}",
+        "times": recorded.time_s[::stride].tolist(),
+        "readings": significant(readings[::stride], _DIGITS).tolist(),
+        "factor": factor,
+        "unit": unit,
+        "read": with_unit(case.instrument.read.title, unit),
+        "sample": {name: case.parameters[name] for name in _SLID},
+        "ends": [math.log10(min(values) / _BEYOND), math.log10(max(values) * _BEYOND)],
+        "arm": {
+            "stiffness": gripper.left.stiffness_Nm_per_rad,
+            "damping": gripper.left.damping_Nms_per_rad,
+            "lever": 2 * gripper.lever_m**2,
+        },
+        "steps": [(start, height) for start, _, height in case.torque.jumps],
+    }

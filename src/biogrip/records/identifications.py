@@ -238,15 +238,6 @@ def share_with_limits(count: int, runs: int) -> tuple[float, float, float]:
     return count / runs, float(low), float(high)
 
 
-def median_with_limits(values: Array) -> tuple[float, float, float]:
-    """Return the median of values, (n,), and its 95 % interval from their order."""
-    from scipy.stats import binom
-
-    ordered, count = np.sort(values), len(values)
-    first = max(int(binom.ppf(0.025, count, 0.5)) - 1, 0)
-    return float(np.median(values)), float(ordered[first]), float(ordered[count - 1 - first])
-
-
 def share_in_words(count: int, runs: int) -> str:
     """Return a share of runs in percent with its 95 % interval: ``18 % (10–31)``."""
     share, low, high = (100 * each for each in share_with_limits(count, runs))

@@ -51,10 +51,10 @@ class RowFile:
 
     what: str
     """Content of a row, for messages."""
-    columns: tuple[str, ...]
-    """Column names."""
-    words: tuple[str, ...] = ()
-    """Columns of text, even if it looks like numbers."""
+    columns: tuple[str, ...] = ()
+    """Names of columns; a file may have more."""
+    words: tuple[str, ...] | None = ()
+    """Columns of text, even if it looks like numbers; None if any may be text."""
 
     def write(self, path: Path, rows: Iterable[Sequence[Any]]) -> None:
         """Write a header and rows, consuming an iterator row by row."""
@@ -62,7 +62,23 @@ class RowFile:
 
     def read(self, path: Path, **known: Collection[Any]) -> "pd.DataFrame":
         """Read all rows, which are those of every combination of what is known of columns."""
-        frame = read_frame(path, self.what, self.columns, self.words)
+        import pandas as pd
+
+        text, words = whole(path, self.what), self.words
+        try:
+            frame = pd.read_csv(StringIO(text, newline=""), dtype=dict.fromkeys(words or (), str))
+        except ValueError as error:
+            raise BiogripError(
+                f"{path}: cannot be read as {self.what}: {error}. {AGAIN}"
+            ) from error
+        if not {*self.columns} <= {*frame.columns}:
+            raise BiogripError(f"{path}, line 1: wanted the columns {', '.join(self.columns)}.")
+        for column in frame.columns:
+            if frame.empty or pd.api.types.is_numeric_dtype(frame[column]):
+                continue
+            if words is not None and column not in words:
+                raise BiogripError(f"{path}: {column}: not all are numbers. {AGAIN}")
+            frame[column] = frame[column].map(as_it_was)
         if known:
             require_rows(path, frame, [*known], product(*known.values()))
         return frame
@@ -100,20 +116,23 @@ def seeds_of(batch: str) -> range:
     return range(int(found[1]), int(found[2]) + 1)
 
 
-def whole(path: Path, what: str = "a table") -> str:
-    """Return the text of a CSV file, whose last line must have an end, and each row all cells."""
+def whole(path: Path, what: str = "a table", again: str = f" {AGAIN}") -> str:
+    """Return the text of a CSV file, in which each row must have all cells.
+
+    The last line must have an end, too, if the same command makes the file again.
+    """
     try:
-        with path.open(encoding="utf-8", newline="") as stream:
-            text = stream.read()
+        with path.open(encoding="utf-8-sig", newline="") as stream:
+            text = stream.read() if again else stream.read().rstrip("\r\n") + "\n"
         if "\0" in text:
             raise ValueError("found a byte of 0")
         widths = [len(row) for row in csv.reader(StringIO(text, newline=""), strict=True)]
     except (OSError, ValueError, csv.Error) as error:
-        raise BiogripError(f"{path}: cannot be read as {what}: {error}. {AGAIN}") from error
+        raise BiogripError(f"{path}: cannot be read as {what}: {error}.{again}") from error
     short = [line for line, width in enumerate(widths, start=1) if width != widths[0]]
     if short or not text.endswith("\n"):
         line = short[0] if short else len(widths)
-        raise BiogripError(f"{path}, line {line}: part of the line is missing. {AGAIN}")
+        raise BiogripError(f"{path}, line {line}: part of the line is missing.{again}")
     return text
 
 
@@ -129,44 +148,13 @@ def require_rows(
     raise BiogripError(f"{path}: found {len(found)} rows, wanted {len(known)}{text}. {AGAIN}")
 
 
-def read_frame(
-    path: Path, what: str, columns: Sequence[str], words: Sequence[str] | None = None
-) -> "pd.DataFrame":
-    """Read rows of a CSV file that have at least the given columns.
-
-    Those of words are text even if it looks like numbers, all others numbers; without words, any
-    may be text. `what` says in messages what the file holds.
-    """
-    import pandas as pd
-
-    text = whole(path, what)
-    try:
-        frame = pd.read_csv(StringIO(text, newline=""), dtype=dict.fromkeys(words or (), str))
-    except ValueError as error:
-        raise BiogripError(f"{path}: cannot be read as {what}: {error}. {AGAIN}") from error
-    if not set(columns) <= set(frame.columns):
-        raise BiogripError(f"{path}, line 1: wanted the columns {', '.join(columns)}.")
-    for column in frame.columns:
-        numbers = frame.empty or pd.api.types.is_numeric_dtype(frame[column])
-        if words is not None and column not in words and not numbers:
-            raise BiogripError(f"{path}: {column}: not all are numbers. {AGAIN}")
-    for column in frame.columns:
-        if not pd.api.types.is_numeric_dtype(frame[column]):
-            frame[column] = frame[column].map(as_it_was)
-    return frame
-
-
 def read_rows(path: Path, columns: Sequence[str] | None = None) -> list[list[str]]:
-    """Read the header, which may have to be given columns, and all rows as text."""
-    import pandas as pd
+    """Read the header, which may have to be given columns, and all rows as text.
 
-    if columns is not None:
-        whole(path)
-    try:
-        frame = pd.read_csv(path, header=None, dtype=str, na_filter=False)
-    except (OSError, ValueError) as error:
-        raise BiogripError(f"{path}: cannot be read: {str(error).strip()}.") from error
-    rows: list[list[str]] = frame.map(as_it_was).to_numpy().tolist()
+    Without columns the file is a user's, see `whole`.
+    """
+    text = whole(path, again="" if columns is None else f" {AGAIN}")
+    rows = [[*map(as_it_was, row)] for row in csv.reader(StringIO(text, newline=""))]
     if columns is not None and rows[0] != list(columns):
         found, wanted = ",".join(rows[0]), ",".join(columns)
         raise BiogripError(f"{path}, line 1: found {found}; wanted {wanted}.")

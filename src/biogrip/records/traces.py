@@ -52,19 +52,6 @@ class Measurements:
         )
 
 
-def of_recording(recording: Recording) -> Measurements:
-    """Return the measurements of a recorded trace, whose seed is 0."""
-    return Measurements(
-        recording.time_s,
-        None,
-        {0: recording.readings},
-        sd=recording.sd,
-        sd_known=recording.sd_known,
-        onset_s=recording.onset_s,
-        remarks=tuple(recording.remarks()),
-    )
-
-
 def write_target(
     path: Path,
     instrument: Instrument,

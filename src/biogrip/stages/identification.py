@@ -76,7 +76,7 @@ def identify(
     records = []
     for group in groups(seeds):
         traces = [recorded.readings[seed] for seed in group]
-        rngs = [stream(case.study.study_seed, case.name, seed, method) for seed in group]
+        rngs = [stream(case.study.config.study_seed, case.name, seed, method) for seed in group]
         problems = experiment.of_each(recorded.time_s, traces)
         answers = identified(problems, rngs, progress.within)
         for seed, trace, answer in zip(group, traces, answers, strict=True):
@@ -123,11 +123,7 @@ def join(
 
 
 def fit(
-    case: Case,
-    seeds: Sequence[int],
-    measurements: Path,
-    calibrated: list[Path],
-    fits: Path,
+    case: Case, seeds: Sequence[int], measurements: Path, calibrated: list[Path], fits: Path
 ) -> None:
     """Fit a batch of seeds by least squares with each model."""
     models = {name: sample.model for name, sample in case.models.items()}
@@ -137,21 +133,13 @@ def fit(
     rows: dict[str, list[tuple[str | int, ...]]] = {name: [] for name in models}
     for group in groups(seeds):
         traces = experiment.of_each(recorded.time_s, [recorded.readings[seed] for seed in group])
-        found = fit_models(
-            {
-                name: [experiment.for_model(trace, model) for trace in traces]
-                for name, model in models.items()
-            },
-            case.block.least_squares,
-            {
-                name: [
-                    stream(case.study.study_seed, case.name, seed, f"model {name}")
-                    for seed in group
-                ]
-                for name in models
-            },
-            partial(progress.done, len(group)),
-        )
+        posed, rngs = {}, {}
+        for name, model in models.items():
+            posed[name] = [experiment.for_model(trace, model) for trace in traces]
+            whose = case.study.config.study_seed, case.name
+            rngs[name] = [stream(*whose, seed, f"model {name}") for seed in group]
+        done = partial(progress.done, len(group))
+        found = fit_models(posed, case.block.least_squares, rngs, done)
         for name, answers in found.items():
             sizes = len(models[name].names), len(recorded.time_s)
             rows[name] += [

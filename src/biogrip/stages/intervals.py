@@ -46,21 +46,16 @@ def estimate(
 
     The noise of a seed is that of its measurement.
     """
+    INTERVALS.write(intervals, _rows(case, seeds, target, expected, calibrated))
+
+
+def _rows(
+    case: Case, seeds: Sequence[int], target: Path, expected: Path, calibrated: list[Path]
+) -> Iterator[tuple[str | int, ...]]:
     experiment = case.judged_experiment.calibrated(calibrated)
     time_s, _, rotation = read_target(target, case.times_s)
     found = read_verdicts(expected)["quantities"]
     determined = {item["quantity"] for item in found if item["verdict"] == DETERMINED}
-    INTERVALS.write(intervals, _rows(case, experiment, seeds, time_s, rotation, determined))
-
-
-def _rows(
-    case: Case,
-    experiment: Experiment,
-    seeds: Sequence[int],
-    time_s: Array,
-    rotation: Array,
-    determined: set[str],
-) -> Iterator[tuple[str | int, ...]]:
     every = parameters_and_sum(experiment.searched)
     selected = [index for index, quantity in enumerate(every) if quantity.label in determined]
     rest_known, informed, truth = _rest_known(case, experiment, time_s, rotation)
@@ -85,7 +80,8 @@ def _rows(
             for which, finding in zip(shown, findings, strict=True):
                 given = (finding, known[index]) if which in selected else None
                 texts = _estimates(every[which], judged[index].likelihood.best, given)
-                verdict = _verdict(finding) if in_full else ["", "", ""]
+                limits = ("" if it is None else f"{it:.5g}" for it in (finding.low, finding.high))
+                verdict = (finding.verdict, *limits) if in_full else ("", "", "")
                 yield case.name, every[which].label, seed, *texts, *verdict
         progress.done(len(group))
 
@@ -125,9 +121,7 @@ def _judged(
 
 
 def judge_quantities(
-    fits: Sequence[TraceFit],
-    quantities: Sequence[Quantity],
-    confidence: float,
+    fits: Sequence[TraceFit], quantities: Sequence[Quantity], confidence: float
 ) -> list[Diagnosis]:
     """Judge quantities of traces as users are shown them, but for notes and combinations."""
 
@@ -154,8 +148,3 @@ def _estimates(
         narrow = low is not None and high is not None and high - low < _NARROW
         digits = _MORE_DIGITS if narrow else _DIGITS
     return ["" if log is None else f"{math.exp(log):.{digits}g}" for log in logs]
-
-
-def _verdict(found: Finding) -> list[str]:
-    limits = ["" if limit is None else f"{limit:.5g}" for limit in (found.low, found.high)]
-    return [found.verdict, *limits]

@@ -20,13 +20,7 @@ from biogrip.physics.protocol import evaluate, sample_times
 from biogrip.physics.simulation import compute_grip, jaw_force, simulated_response
 from biogrip.physics.unilateral import unilateral_response
 from biogrip.records.rows import write_arrays
-from biogrip.records.traces import (
-    Measurements,
-    of_recording,
-    read_target,
-    write_measurements,
-    write_target,
-)
+from biogrip.records.traces import Measurements, read_target, write_measurements, write_target
 from biogrip.study.study import Case
 from biogrip.terminal import warn
 from biogrip.traces.columns import place
@@ -39,33 +33,29 @@ def simulate(case: Case, target: Path) -> None:
     A response that is not finite, or turns the arms beyond the combs' stroke, is an error.
     """
     time_s = case.times_s
-    controlled = evaluate(case.torque, time_s)
-    if not case.instrument.has_jaws:
-        device = case.gripper, case.network, case.torque
-        read = simulated_response(*device, time_s, nonlinear=False)[0]
-        _check_finite(case, time_s, read)
-        write_target(target, case.instrument, time_s, controlled, read)
-        return
-    rotation, force = response(case, time_s)
-    _check_finite(case, time_s, rotation)
-    largest = float(np.max(np.abs(rotation)))
-    if largest > case.stroke:
-        raise BiogripError(
-            f"the protocol turns the arms by {1e3 * largest:.4g} mrad, allowed is what the comb "
-            f"drive's stroke leaves, {1e3 * case.stroke:.4g} mrad."
-        )
-    _warn_if_contact_is_lost(case)
-    write_target(target, case.instrument, time_s, controlled, rotation, force)
+    read, force = response(case, time_s)
+    _check_finite(case, time_s, read)
+    if case.instrument.has_jaws:
+        largest = float(np.max(np.abs(read)))
+        if largest > case.stroke:
+            raise BiogripError(
+                f"the protocol turns the arms by {1e3 * largest:.4g} mrad, allowed is what the "
+                f"comb drive's stroke leaves, {1e3 * case.stroke:.4g} mrad."
+            )
+        _warn_if_contact_is_lost(case)
+    write_target(target, case.instrument, time_s, evaluate(case.torque, time_s), read, force)
 
 
-def response(case: Case, time_s: Array) -> tuple[Array, Array]:
-    """Return the rotation of the left arm and the jaw force, (n_samples,) each."""
+def response(case: Case, time_s: Array) -> tuple[Array, Array | None]:
+    """Return what is read and, if there are jaws, their force, (n_samples,) each."""
     device, nonlinear = (case.gripper, case.network, case.torque), case.nonlinear_target
     if case.unilateral:
         found = unilateral_response(*device, time_s)
         return found.rotation[0], found.jaw_force_N
-    rotation = simulated_response(*device, time_s, nonlinear=nonlinear)
-    return rotation[0], jaw_force(*device, time_s, nonlinear=nonlinear)[0]
+    read = simulated_response(*device, time_s, nonlinear=nonlinear)[0]
+    if not case.instrument.has_jaws:
+        return read, None
+    return read, jaw_force(*device, time_s, nonlinear=nonlinear)[0]
 
 
 def _check_finite(case: Case, time_s: Array, simulated: Array) -> None:
@@ -92,7 +82,7 @@ def _warn_if_contact_is_lost(case: Case) -> None:
 def measure(case: Case, seeds: Iterable[int], target: Path, measurements: Path) -> None:
     """Add noise of each seed in a batch to a target, CSV, and write the traces, npz."""
     time_s, _, rotation = read_target(target, case.times_s)
-    rngs = {seed: stream(case.study.study_seed, case.name, seed, "noise") for seed in seeds}
+    rngs = {seed: stream(case.study.config.study_seed, case.name, seed, "noise") for seed in seeds}
     traces = {seed: add_noise(rotation, case.noise, rng, time_s) for seed, rng in rngs.items()}
     write_measurements(measurements, Measurements(time_s, rotation, traces))
 
@@ -106,11 +96,9 @@ def calibrate_gripper(case: Case, gripper: Path, records: Path) -> None:
     columns, found = {"time_s": time_s}, {}
     for name in ("left", "right"):
         motion = free_motion(getattr(case.gripper, name), time_s, *causes)
-        rng = stream(case.study.study_seed, case.name, 0, f"calibration {name}")
+        rng = stream(case.study.config.study_seed, case.name, 0, f"calibration {name}")
         record = FreeMotion(
-            time_s,
-            add_noise(motion.step, noise, rng),
-            add_noise(motion.impulse, noise, rng),
+            time_s, add_noise(motion.step, noise, rng), add_noise(motion.impulse, noise, rng)
         )
         columns |= {f"{name}_step_rad": record.step, f"{name}_impulse_rad": record.impulse}
         found[name] = calibrate(record, *causes)
@@ -123,6 +111,9 @@ def record(case: Case, recorded: Path, measurements: Path) -> None:
     if case.columns.load is not None:
         raise BiogripError(f"{place(recorded)}: measurement.load is only for biogrip identify.")
     trace, _ = prepare(read_recording(recorded, case.columns), case.experiment)
-    for remark in trace.remarks():
+    remarks = tuple(trace.remarks())
+    for remark in remarks:
         warn(f"{place(recorded)}: {remark}")
-    write_measurements(measurements, of_recording(trace))
+    known = trace.sd, trace.sd_known, trace.onset_s, remarks
+    found = Measurements(trace.time_s, None, {0: trace.readings}, *known)
+    write_measurements(measurements, found)

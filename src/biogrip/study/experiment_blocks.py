@@ -301,10 +301,8 @@ def _parameter_complaints(
             continue
         parameter = by_name[name]
         vanishes = value == 0 and parameter.may_vanish
-        if (
-            not (vanishes or _LEAST_PARAMETER <= value <= LARGEST_PARAMETER)
-            or value >= parameter.below
-        ):
+        usual = vanishes or _LEAST_PARAMETER <= value <= LARGEST_PARAMETER
+        if not usual or value >= parameter.below:
             zero = "0 or " if parameter.may_vanish else ""
             bounded = parameter.below < LARGEST_PARAMETER
             most = f"below {parameter.below:g}" if bounded else f"at most {LARGEST_PARAMETER:g}"

@@ -45,11 +45,8 @@ READINGS = tuple(INSTRUMENTS)
 _FREQUENCIES = AXES["frequency"]
 _SWEPT = tuple(name for name, instrument in INSTRUMENTS.items() if instrument.sweeps)
 _OF_SWEEPS = ("frequency", "frequency_unit", *PARTNERS, "partner_unit", "loss_sd")
-_OF_FILE = (
-    *("time", *READINGS, *_OF_SWEEPS, "time_unit", "rotation_unit", "reading_unit", "scale"),
-    *("block", "rows", "load", "load_unit", "average_repeated", "from_s", "until_s"),
-    *("sphere", *KNOWN_NOISE, "start_s", "fit_start"),
-)
+# Keys of simulated traces, too; the others are of a file.
+_OF_ALL = {"rate_Hz", "file", "noise", "noise_model", "offset", "drift"}
 
 
 def _unit(allowed: Mapping[str, float]) -> BeforeValidator:
@@ -245,9 +242,8 @@ class MeasurementBlock(Block):
             if self.fit_start and getattr(self, other) is not None:
                 yield ("fit_start",), f"does not go with {other}; allowed is one of them."
         if self.file is None:
-            for key in _OF_FILE:
-                given = getattr(self, key)
-                if given is not None and given is not False:
+            for key, given in vars(self).items():
+                if key not in _OF_ALL and given not in (None, False):
                     yield (key,), "is only for a recorded trace, whose measurement has a file."
             return
         yield from self._axis_complaints()

@@ -43,11 +43,6 @@ def default_config() -> Path:
     return _TOP / "config" / "config.yaml"
 
 
-def snakefile() -> Path:
-    """Return the Snakefile that runs a study."""
-    return shipped("Snakefile")
-
-
 def shipped(name: str) -> Path:
     """Return another file that comes with the code, by its path in the repository."""
     return _TOP / name

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
@@ -24,7 +24,7 @@ from biogrip.physics.noise import Noise
 from biogrip.physics.protocol import Course, Phase, join_phases, sample_times
 from biogrip.physics.sample_model import Network, with_fixed
 from biogrip.study.case_blocks import CALIBRATED, OVERRIDABLE, CaseBlock
-from biogrip.study.config import StudyConfig
+from biogrip.study.config import StudyConfig, list_points, point_blocks
 from biogrip.study.messages import checked, schema_of
 from biogrip.study.source import (
     KeyPath,
@@ -37,7 +37,6 @@ from biogrip.study.source import (
     read_source,
     values_in,
 )
-from biogrip.study.sweeps import list_points, point_blocks
 from biogrip.traces.columns import Columns
 
 
@@ -56,7 +55,7 @@ class Case:
     @cached_property
     def plain(self) -> dict[str, Any]:
         """Config block as plain values, without keys that have their default."""
-        return cast("dict[str, Any]", plain(self.block))
+        return plain(self.block)
 
     @property
     def title(self) -> str:
@@ -98,11 +97,6 @@ class Case:
     def times_s(self) -> Array:
         """Times of a simulated trace, (n_samples,)."""
         return sample_times(self.torque.end_s, self.block.measurement.rate_Hz)
-
-    @property
-    def samples(self) -> int:
-        """Number of samples in a simulated trace."""
-        return len(self.times_s)
 
     @property
     def columns(self) -> Columns:
@@ -214,9 +208,8 @@ class Case:
     @property
     def _given_ranges(self) -> frozenset[str]:
         """Names of search ranges that are not the default study's: those that the user gave."""
-        default = built(SearchRange, read_config(default_config())["search_range"])
-        given = vars(self.block.search_range).items()
-        return frozenset(name for name, genes in given if genes != getattr(default, name))
+        given = vars(self.block.search_range)
+        return frozenset(name for name, it in default_ranges().items() if it != given[name])
 
     @property
     def judged_experiment(self) -> Experiment:
@@ -225,7 +218,7 @@ class Case:
             self.experiment,
             least_squares=self.block.least_squares,
             confidence=self.confidence,
-            study_seed=self.study.study_seed,
+            study_seed=self.study.config.study_seed,
         )
         if not self.recorded:
             return judged
@@ -267,7 +260,7 @@ class Study:
     @cached_property
     def plain(self) -> dict[str, Any]:
         """Config as plain values, without keys that have their default."""
-        return cast("dict[str, Any]", plain(self.config))
+        return plain(self.config)
 
     @cached_property
     def cases(self) -> dict[str, Case]:
@@ -309,11 +302,6 @@ class Study:
         return self._where(lambda case: not case.recorded and case.instrument.has_jaws)
 
     @property
-    def has_gripper(self) -> bool:
-        """True if the gripper holds the sample of any case."""
-        return any(case.instrument.has_jaws for case in self.cases.values())
-
-    @property
     def covered(self) -> list[str]:
         """Names of cases whose intervals are tested for coverage."""
         return self._where(lambda case: case.coverage_seeds > 0)
@@ -328,11 +316,6 @@ class Study:
     def published(self) -> list[str]:
         """Names of cases that the paper reports results of."""
         return self._where(lambda case: case.published.table is not None)
-
-    @property
-    def study_seed(self) -> int:
-        """The seed that all random streams derive from."""
-        return self.config.study_seed
 
     @property
     def near_noise_tolerance(self) -> float:
@@ -363,11 +346,6 @@ class Study:
         return self.config.protocol.make_phases(GRIPPER, self.actuator)
 
     @property
-    def ranges(self) -> dict[str, GeneRange]:
-        """Search ranges of all parameters, by the name of the range."""
-        return dict[str, GeneRange](vars(self.config.search_range))
-
-    @property
     def identifiers(self) -> dict[str, Method]:
         """Declarations of the methods, by name."""
         return {name: METHODS[name] for name in self.config.methods}
@@ -389,6 +367,12 @@ class Study:
 
 
 _SHOWN = 6
+
+
+def default_ranges() -> dict[str, GeneRange]:
+    """Return the search ranges of the default study."""
+    found = built(SearchRange, read_config(default_config())["search_range"])
+    return dict[str, GeneRange](vars(found))
 
 
 def read_configs(files: Iterable[Path]) -> dict[str, Any]:

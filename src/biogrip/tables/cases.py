@@ -27,6 +27,7 @@ from biogrip.records.identifications import (
 from biogrip.study.study import Case, Study
 from biogrip.tables.layout import Column, Row, ShownTable
 
+_PERCENTILES = {"p05": 5, "p25": 25, "median": 50, "p75": 75, "p95": 95}
 _COLUMNS = (
     Column("case", "Case"),
     Column("parameter", "Parameter"),
@@ -36,11 +37,10 @@ _COLUMNS = (
     Column("paper_error_percent", "Paper error %", 2),
     Column("basin", "Runs that end"),
     Column("seeds", "Seeds"),
-    Column("p05_identified", "5 %", 3),
-    Column("p25_identified", "25 %", 3),
-    Column("median_identified", "Median", 3),
-    Column("p75_identified", "75 %", 3),
-    Column("p95_identified", "95 %", 3),
+    *(
+        Column(f"{name}_identified", "Median" if name == "median" else f"{percent} %", 3)
+        for name, percent in _PERCENTILES.items()
+    ),
     Column("median_error_percent", "Error of the median %", 2),
     Column("median_absolute_error_percent", "Median abs. error %", 2),
 )
@@ -48,7 +48,6 @@ _BASINS = (
     "Runs that end near the noise of their trace and runs that end above it have rows of their own "
     "if a tenth or more end in each. Error = (target - identified) / target."
 )
-_PERCENTILES = {"p05": 5, "p25": 25, "median": 50, "p75": 75, "p95": 95}
 
 
 def _columns(near_noise_tolerance: float) -> tuple[Column, ...]:

@@ -59,12 +59,6 @@ class ShownTable:
     rows: Sequence[Mapping[str, Any]]
     """See `Row`."""
 
-    def __post_init__(self) -> None:
-        """Raise `ValueError` if a row has a cell of no column."""
-        names = {column.name for column in self.columns}
-        if extra := {name for row in self.rows for name in row} - names:
-            raise ValueError(f"cells of no column: {', '.join(sorted(extra))}")
-
 
 def write(table: ShownTable, output: Path) -> None:
     """Write a table as CSV, and without empty columns as HTML beside it."""

@@ -193,12 +193,8 @@ def unit_of(
     """Return the unit of a column, a key of `allowed`; if ``1`` is among them, none need be given.
 
     It is `given`, at the end of the column's name, or in its cell `below` in a row of units. What
-    states it, `said_by`, is for messages.
-
-    Raises
-    ------
-    BiogripError
-        If no allowed unit is given, or two of name, cell and statement contradict each other.
+    states it, `said_by`, is for messages. A `BiogripError` says that no allowed unit is given, or
+    which of name, cell and statement contradict each other.
     """
     where, choices = place(path, column=column), ", ".join(allowed)
     at_end, in_row = _unit_at_end(column, allowed), unit_in_cell(below, allowed)

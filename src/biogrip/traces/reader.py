@@ -15,14 +15,7 @@ from biogrip.errors import BiogripError, nearest
 from biogrip.physics.instruments import INSTRUMENTS, PHASE
 from biogrip.physics.protocol import joined
 from biogrip.terminal import visible
-from biogrip.traces.columns import (
-    AXES,
-    Columns,
-    listed,
-    place,
-    shortened,
-    unit_of,
-)
+from biogrip.traces.columns import AXES, Columns, listed, place, shortened, unit_of
 from biogrip.traces.tables import (
     BLANKS,
     DAY_S,
@@ -193,15 +186,8 @@ def read_recording(path: Path, columns: Columns) -> Recording:
 
     An empty cell, ``nan``, ``NA``, ``N/A``, ``#N/A``, ``#NV`` (in any case) or ``-`` is a gap. Its
     row is left out and counted; nothing is interpolated. Other spreadsheet errors, as ``#REF!``,
-    are refused.
-
-    Raises
-    ------
-    BiogripError
-        If the file is no text, lacks a column or repeats it, has it in several blocks of which none
-        is named, a unit is unknown or contradicted, a row has too few or too many cells, or text
-        that is neither a finite number nor a gap, a standard deviation is not positive, the time
-        does not increase, or there are fewer than `FEWEST_SAMPLES` samples.
+    are refused. A `BiogripError` has file, line and column of what cannot be used, and what is
+    allowed.
     """
     sheet, quantity = read_sheet(path, columns), columns.quantity
     if columns.reading == quantity.name and quantity.name not in sheet.cells:
@@ -256,12 +242,8 @@ def read_recording(path: Path, columns: Columns) -> Recording:
 def recording_of_arrays(columns: Columns, *arrays: Array) -> Recording:
     """Return a recording of times, readings and perhaps standard deviations, (n_samples,) each.
 
-    Messages and units go by the names in `columns`; a row with a NaN is a gap.
-
-    Raises
-    ------
-    BiogripError
-        As `read_recording`, or if `columns` asks for what only a file has.
+    Messages and units go by the names in `columns`; a row with a NaN is a gap. A `BiogripError`
+    is as of `read_recording`, or says that `columns` asks for what only a file has.
     """
     for key in ("block", "rows", "load"):
         if getattr(columns, key) is not None:
@@ -288,8 +270,11 @@ def _checked(
     values, lines, without_number = values[~gaps], lines[~gaps], int(np.count_nonzero(gaps))
     _check_count(path, columns, len(values), without_number)
     for index, (key, column) in enumerate(columns.named.items()):
-        if key in ("sd", "loss_sd"):
-            _check_positive(path, column, values[:, index], lines)
+        for row in np.flatnonzero(values[:, index] <= 0)[:1] if key in ("sd", "loss_sd") else ():
+            raise BiogripError(
+                f"{place(path, lines[row], column)}: found {values[row, index]:.15g}, allowed is a "
+                "standard deviation above 0."
+            )
     if columns.partner:
         ascending = np.argsort(values[:, 0], kind="stable")
         values, lines = values[ascending], lines[ascending]
@@ -544,14 +529,6 @@ def _check_count(
         raise BiogripError(
             f"{place(path)}: found {counted(found, what)} with a number in {which}{gaps}, "
             f"allowed are at least {fewest}."
-        )
-
-
-def _check_positive(path: Path | None, column: str, sd: Array, lines: IntArray) -> None:
-    for row in np.flatnonzero(sd <= 0)[:1]:
-        raise BiogripError(
-            f"{place(path, lines[row], column)}: found {sd[row]:.15g}, allowed is a standard "
-            "deviation above 0."
         )
 
 

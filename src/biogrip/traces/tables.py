@@ -119,10 +119,8 @@ class Table:
 def read_sheet(path: Path, columns: Columns) -> Sheet:
     """Read the cells of a text file.
 
-    Raises
-    ------
-    BiogripError
-        If it is no file, or no text in UTF-8, UTF-16 or Windows-1252, or a quote has no end.
+    A `BiogripError` says that it is no file, or no text in UTF-8, UTF-16 or Windows-1252, or which
+    quote has no end.
     """
     encoding, lines = _read_lines(path)
     numbered = _with_names(lines, {*map(plain_name, columns.named.values())})
@@ -272,11 +270,8 @@ def _separator(lines: Sequence[str], headers: Sequence[str], columns: Columns) -
 def find_tables(path: Path, sheet: Sheet, columns: Columns) -> tuple[list[Table], int]:
     """Find the tables of a file, and the index of the block to read, or the only one that can be.
 
-    Raises
-    ------
-    BiogripError
-        With a list of the tables, if there is no such block, or no block is asked for and several
-        have the columns.
+    A `BiogripError` lists the tables, if there is no such block, or several have the columns and
+    none is asked for.
     """
     tables = _tables(sheet, columns) or [_likely_table(sheet)]
     common = [table.common(columns) for table in tables]

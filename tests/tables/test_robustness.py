@@ -8,7 +8,7 @@ import pytest
 from biogrip.judging.likelihood import headlines
 from biogrip.records.identifications import columns
 from biogrip.records.rows import write_rows
-from biogrip.stages import sweeps as stage
+from biogrip.tables import sweeps as stage
 from biogrip.tables.sweeps import robustness
 from tests.helpers.default import study_of
 from tests.helpers.problems import MODEL, rotation

@@ -1,23 +1,131 @@
-"""How often limits hold the truth: of intervals and verdicts, beside spreads and bounds."""
+"""Tables of a whole study: methods and models on its traces, and how often limits are true."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 from scipy.stats import binomtest
 
+from biogrip.fit.nested_fits import aic_and_bic
 from biogrip.judging.levels import WIDE
 from biogrip.judging.likelihood import bound
-from biogrip.judging.quantities import parameters_and_sum
+from biogrip.judging.quantities import Quantity, parameters_and_sum
 from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
 from biogrip.physics.noise import standard_deviation
-from biogrip.records.identifications import INTERVALS
+from biogrip.records.identifications import (
+    ENCODABLE,
+    INTERVALS,
+    MODEL_FITS,
+    chi_square_increase,
+    reached_encodable,
+    read_identifications,
+    share_with_limits,
+)
 from biogrip.records.rows import require_rows, seeds_of
 from biogrip.records.traces import read_target
-from biogrip.study.study import Study
-from biogrip.tables.cases import target_of
+from biogrip.study.study import Case, Study
+from biogrip.tables.cases import error_percent, target_of
 from biogrip.tables.layout import Column, Row, ShownTable
+
+_METHOD_COLUMNS = (
+    Column("case", "Case"),
+    Column("method", "Method"),
+    Column("seeds", "Seeds"),
+    Column("reached_share", "Share that reached the best encodable point", 2),
+    Column("reached_low", "95 % from", 2),
+    Column("reached_high", "95 % to", 2),
+    Column("median_rise", "Median Δχ²", 2),
+    Column("encodable_rise", "Median Δχ² of that point", 2),
+    Column("median_evaluations", "Median responses", 3),
+)
+
+
+def methods(study: Study, identifications: list[Path]) -> ShownTable:
+    """Compare success rate, errors and cost of each method."""
+    rows = []
+    labels = {}
+    for (name, case), path in zip(study.cases.items(), identifications, strict=True):
+        found = read_identifications(path, case)
+        found["increase"] = chi_square_increase(found, len(case.times_s))
+        found["least"] = chi_square_increase(found, len(case.times_s), ENCODABLE)
+        found["reached"] = reached_encodable(found, len(case.times_s), study.optimum_tolerance)
+        for method, mine in found.groupby("method", sort=False):
+            share, low, high = share_with_limits(int(mine["reached"].sum()), len(mine))
+            row: Row = {
+                "case": name,
+                "method": study.identifiers[method].title,
+                "seeds": len(mine),
+                "reached_share": share,
+                "reached_low": low,
+                "reached_high": high,
+                "median_rise": np.median(mine["increase"]),
+                "encodable_rise": np.median(mine["least"]),
+                "median_evaluations": float(mine["evaluations"].median()),
+            }
+            for quantity in case.sample.model.quantities:
+                label = " + ".join(p.name for p in quantity)
+                values = mine[[p.column for p in quantity]].sum(axis=1).to_numpy(float)
+                error = np.abs(error_percent(target_of(label, case.parameters), values))
+                row[f"error_percent {label}"] = np.median(error)
+                labels[f"error_percent {label}"] = f"Error {label} %"
+            rows.append(row)
+    errors = (Column(name, heading, 2) for name, heading in labels.items())
+    caption = (
+        "Methods on the same traces. Reached: chi-squared, in mean squares of that point, at most "
+        f"{study.optimum_tolerance:g} above that of the best point that the genes can encode of "
+        "the trace (95 % interval by Wilson); methods without digits may lie below. That point is "
+        "the lowest around the ends of all methods' runs: were there a lower one, a run that is "
+        "just within the bound would not count. Δχ² is above the lowest that any method, or the "
+        "truth, has on the trace. Errors are medians of the absolute error."
+    )
+    return ShownTable(caption, (*_METHOD_COLUMNS, *errors), rows)
+
+
+_MODEL_COLUMNS = (
+    Column("case", "Case"),
+    Column("model", "Model"),
+    Column("parameters", "Parameters"),
+    Column("median_delta_aic", "Median ΔAIC", 3),
+    Column("median_delta_bic", "Median ΔBIC", 3),
+    Column("chosen_by_aic", "Chosen by AIC"),
+    Column("chosen_by_bic", "Chosen by BIC"),
+    Column("seeds", "Seeds"),
+)
+
+
+def models(study: Study, fits: list[Path]) -> ShownTable:
+    """Count over seeds which model has the lowest AIC and BIC, see `aic_and_bic`."""
+    found = pd.concat([read_fits(study, path) for path in fits])
+    found["aic"], found["bic"] = aic_and_bic(found["misfit"], found["samples"], found["parameters"])
+    rows = []
+    for case, made in study.cases.items():
+        maker = None if made.recorded else made.sample.candidate
+        of_case = found[found["case"] == case]
+        # In the configured order, since idxmin takes the first of equals.
+        tried = list(of_case["model"].unique())
+        values = {c: of_case.pivot(index="seed", columns="model", values=c) for c in ("aic", "bic")}
+        delta = {c: wide[tried].sub(wide.min(axis=1), axis=0) for c, wide in values.items()}
+        for name in tried:
+            model = made.models[name].model
+            row: Row = {"case": case, "model": model.title + " (made the traces)" * (name == maker)}
+            row |= {"parameters": len(model.names), "seeds": len(delta["aic"])}
+            for criterion, each in delta.items():
+                row[f"median_delta_{criterion}"] = each[name].median()
+                row[f"chosen_by_{criterion}"] = (each.idxmin(axis=1) == name).sum()
+            rows.append(row)
+    caption = (
+        "Simplest adequate model: by how much each model's AIC and BIC exceed the lowest, and in "
+        "how many seeds it has the lowest."
+    )
+    return ShownTable(caption, _MODEL_COLUMNS, rows)
+
+
+def read_fits(study: Study, path: Path) -> pd.DataFrame:
+    """Read the fits of every model of a case, in the seeds of a batch."""
+    case = study.cases[path.parent.name]
+    return MODEL_FITS.read(path, case=[case.name], model=case.models, seed=seeds_of(path.stem))
+
 
 _COLUMNS = (
     Column("case", "Case"),
@@ -54,24 +162,17 @@ def coverage(
     rows: list[Row] = []
     estimated = pd.concat([read_intervals(study, it) for it in intervals], ignore_index=True)
     for (name, case), target in zip(study.cases.items(), targets, strict=True):
-        experiment = case.experiment.calibrated([next(calibrations)] if case.is_calibrated else [])
-        log_truth = experiment.logs(case.parameters)
         found = estimated[estimated["case"] == name]
-        time_s, _, rotation = read_target(target, case.times_s)
-        _, sensitivity = experiment.of(time_s, rotation).residuals(log_truth)
-        noise_sd = standard_deviation(rotation, case.noise)
-        for quantity in parameters_and_sum(experiment.searched):
+        own = [next(calibrations)] if case.is_calibrated else []
+        for quantity, limit in bounds_at_truth(case, target, own):
             mine = found[found["quantity"] == quantity.label]
             fitted = mine[mine["estimate_rest_known"].notna()]
             shown = mine[mine["verdict"].notna()]
             if fitted.empty and not np.any(shown["verdict"] != NOT_DETERMINED):
                 continue
-            # The config's value: `log_truth` is clipped to the search range.
-            names = [experiment.searched.names[index] for index in quantity.members]
-            truth = sum(case.parameters[member] for member in names)
+            truth = target_of(quantity.label, case.parameters) or 0.0
             head = {"case": name, "quantity": quantity.label, "unit": quantity.unit}
-            limit = 100 * bound(sensitivity, noise_sd, log_truth, quantity)
-            numbers = _spreads(fitted, truth, limit, case.confidence) | _shown(shown, truth)
+            numbers = _spreads(fitted, truth, 100 * limit, case.confidence) | _shown(shown, truth)
             rows.append({**head, "target": truth, **numbers})
     caption = (
         "Least squares over many seeds, for every quantity that a case's traces should determine: "
@@ -85,6 +186,22 @@ def coverage(
         "often than the confidence says."
     )
     return ShownTable(caption, _COLUMNS, rows)
+
+
+def bounds_at_truth(
+    case: Case, target: Path, calibrated: Sequence[Path]
+) -> list[tuple[Quantity, float]]:
+    """Return what is searched of a case, each with its Cramér-Rao bound at the true parameters.
+
+    That is the standard deviation of the quantity's logarithm.
+    """
+    experiment = case.experiment.calibrated(calibrated)
+    time_s, _, rotation = read_target(target, case.times_s)
+    log_truth = experiment.logs(case.parameters)
+    _, sensitivity = experiment.of(time_s, rotation).residuals(log_truth)
+    noise_sd = standard_deviation(rotation, case.noise)
+    quantities = parameters_and_sum(experiment.searched)
+    return [(each, bound(sensitivity, noise_sd, log_truth, each)) for each in quantities]
 
 
 def read_intervals(study: Study, path: Path) -> pd.DataFrame:
