@@ -70,6 +70,8 @@ rule figures:
         **{name: drawing(name) for name in FIGURES},
     log:
         "results/logs/figures.log",
+    benchmark:
+        "results/benchmarks/figures.tsv"
     params:
         **settings_of(
             *"methods seeds evaluation actuator gripper protocol".split(),
@@ -99,6 +101,8 @@ rule page:
         front=shown("results/answers.html", "pages", "answers", ""),
     log:
         "results/logs/page.log",
+    benchmark:
+        "results/benchmarks/page.tsv"
     params:
         **settings_of(
             # All, for it shows the config.

@@ -16,6 +16,8 @@ rule gripper_figures:
         linkage=drawing("linkage"),
     log:
         "results/logs/gripper_figures.log",
+    benchmark:
+        "results/benchmarks/gripper_figures.tsv"
     params:
         **settings_of(
             *("gripper", "actuator", "protocol"), *keys_of_cases(STUDY, "gripper", *SAMPLE)
@@ -69,6 +71,8 @@ rule linearisation:
         figure=drawing("linearisation"),
     log:
         "results/logs/linearisation.log",
+    benchmark:
+        "results/benchmarks/linearisation.tsv"
     params:
         **settings_of("actuator", *keys_of_cases(GRIPPED, "gripper", "title", *SAMPLE)),
     message:
@@ -91,6 +95,8 @@ rule evidence:
         pages=[page_of_table(name) for name in EVIDENCE],
     log:
         "results/logs/evidence.log",
+    benchmark:
+        "results/benchmarks/evidence.tsv"
     params:
         **settings_of(
             *"methods seeds evaluation actuator gripper search_range".split(),
@@ -181,6 +187,8 @@ rule claims:
         pages=[page_of_table(name) for name in ("claims", "tables_5_to_7")],
     log:
         "results/logs/claims.log",
+    benchmark:
+        "results/benchmarks/claims.tsv"
     params:
         **settings_of(
             *"study_seed methods seeds evaluation actuator gripper readings".split(),

@@ -18,6 +18,8 @@ rule case_tables:
         verdicts_page=page_of_table("verdicts", "{case}"),
     log:
         "results/logs/case_tables/{case}.log",
+    benchmark:
+        "results/benchmarks/case_tables/{case}.tsv"
     wildcard_constraints:
         case=names(STUDY.cases),
     params:
@@ -40,6 +42,8 @@ rule tables:
         pages=[page_of_table(name) for name in TABLES],
     log:
         "results/logs/tables.log",
+    benchmark:
+        "results/benchmarks/tables.tsv"
     params:
         **settings_of(
             *"methods seeds evaluation actuator model_selection".split(),
