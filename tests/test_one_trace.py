@@ -17,7 +17,7 @@ import yaml
 
 from biogrip.arrays import Array
 from biogrip.cli import _parser, main
-from biogrip.command.outputs import WRITTEN_BY
+from biogrip.command.outputs import WRITTEN_BY, Outcome, table_of
 from biogrip.command.settings import Asked, Setting, case_of
 from biogrip.command.words import for_a_paper, in_columns, noise_in_words
 from biogrip.errors import BiogripError
@@ -62,6 +62,8 @@ def test_the_example_gives_its_truth() -> None:
     assert sum(CANDIDATES[name].model.power_law for name in tried) == 2
     assert "generalized_maxwell_3" in tried
     assert said.count("97.5 %") == 1
+    header, (row,) = table_of(Outcome([found], {}, copied={found["trace"]: {}}))
+    assert row[header.index("preferred_model")] == found["preferred_model"] == "liquid_drop"
 
 
 def test_a_declared_offset_and_drift_are_fitted_along() -> None:

@@ -220,14 +220,18 @@ def test_a_killed_process_costs_a_batch_its_trace_alone(
             os.kill(os.getpid(), signal.SIGKILL)
         return whole(asked, outputs, drawn=drawn)
 
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0})
+    # Traces of one batch, each with limits of its own.
+    of_each = f"{HEADER}|identifiability.confidence", "usual.csv|left||||0.9", f"{OTHER}|"
+    write(here / "cells.tsv", *of_each)
     undisturbed = identify("cells.tsv", "--csv", "first.csv")
+    assert [row["confidence"] for row in listed("first.csv")] == ["0.9", "0.95"]
     results = {name: found(name) for name in ("usual.csv", "other.csv")}
     for path in here.glob("*.json"):
         path.unlink()
     with monkeypatch.context() as patched:
         # Killed is every process that is to identify that trace, with all others of its batch.
         patched.setattr(command, "identify_batch", killed)
-        patched.setattr(os, "sched_getaffinity", lambda _: {0})
         status, printed, said = identify("cells.tsv", "--csv", "found.csv")
     assert status == 1
     assert "its traces are identified one by one." in said

@@ -86,6 +86,8 @@ def test_a_limit_is_where_chi_squared_has_risen(seed: int) -> None:
     """
     readings = zener(TIMES) + noise(3.6, seed)
     found = by_name(tell(TIMES, readings, noise_sd=3.6))
+    tiny = by_name(tell(TIMES, 1e-9 * readings, noise_sd=3.6e-9))
+    assert {n: it.verdict for n, it in tiny.items()} == {n: it.verdict for n, it in found.items()}
     least, best = fitted(RELAXED, readings)
     left = np.exp(-RATES * 10)
     slope, omega = 10 * RATES * left, 0.1
