@@ -175,25 +175,20 @@ def test_files_of_instruments_tell_the_same(tmp_path: Path, name: str) -> None:
     np.testing.assert_allclose([storage, loss[::-1]], values, rtol=3e-8)
 
 
-@pytest.mark.parametrize(
-    ("header", "options", "said"),
-    [
+def test_what_a_sweep_cannot_have_is_refused(tmp_path: Path) -> None:
+    for header, options, said in (
         ("w,G' (Pa),G'' (Pa)", [], "column 'w': found no unit"),
         ("frequency (1/s),G' (Pa),G'' (Pa)", [], "found the unit 1/s; allowed are rad/s or Hz"),
         ("w (rad/s),G' (Pa),G'' (Pa)", ["--hold", "1"], "is of a trace in time, not of a sweep"),
         ("w (rad/s),G' (Pa),G'' (Pa)", ["--drift"], "this is a frequency sweep; leave it out"),
         ("w (rad/s),G' (Pa),G'' (Pa)", ["--reading", "phase=x"], "found loss and phase"),
         ("w (rad/s),G' (Pa),G'' (Pa)", ["--sd", "x"], "both moduli need deviations"),
-    ],
-)
-def test_what_a_sweep_cannot_have_is_refused(
-    tmp_path: Path, header: str, options: list[str], said: str
-) -> None:
-    trace = write_trace(tmp_path / "sweep.csv", OMEGA, *solid(), header=header)
-    names = header.split(",")
-    given = ["--frequency", names[0], "--reading", f"storage={names[1]}"]
-    status, _, complained = identify(trace, *given, "--reading", f"loss={names[2]}", *options)
-    assert (status, said in complained) == (1, True), complained
+    ):
+        trace = write_trace(tmp_path / "sweep.csv", OMEGA, *solid(), header=header)
+        names = header.split(",")
+        given = ["--frequency", names[0], "--reading", f"storage={names[1]}"]
+        status, _, complained = identify(trace, *given, "--reading", f"loss={names[2]}", *options)
+        assert (status, said in complained) == (1, True), complained
 
 
 @pytest.mark.parametrize(

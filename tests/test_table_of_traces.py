@@ -319,22 +319,17 @@ def test_an_option_is_a_column_too_and_words_are_no_setting(tmp_path: Path) -> N
     assert list(read_table(path)[0].copied) == alike + others
 
 
-@pytest.mark.parametrize(
-    ("meant", "names", "cell"),
-    [
+def test_what_looks_like_a_setting_is_not_copied_beside_the_result(tmp_path: Path) -> None:
+    for meant, names, cell in (
         ("gripper.arm_length_m", ("arm_length_m", "Arm length", "gripper_arm_lenght_m"), "1"),
         ("hold", ("stress_Pa", "hold_Pa", "hodl", "pressure_mbar", "Force (pN)"), "1"),
         *(("hold", ["stress"], "8 Pa"), ("start", ["start_s"], "1")),
         *(("noise", ["noise (rad)", "noize"], "1"), ("noise_model", ["noise_modle"], "coloured")),
         ("model", ["modle", "sample type"], "sls"),
-    ],
-)
-def test_what_looks_like_a_setting_is_not_copied_beside_the_result(
-    tmp_path: Path, meant: str, names: list[str], cell: str
-) -> None:
-    path = tmp_path / "cells.csv"
-    for name in names:
-        path.write_text(f"file,{name}\na.csv,{cell}\n")
-        said = f"looks like a setting and is none; allowed is '{meant}' for a column that sets it, "
-        said += "in SI units, or a name unlike a setting's."
-        assert refused(path) == [f"{path}, line 1, column '{name}': {said}"]
+    ):
+        path = tmp_path / "cells.csv"
+        for name in names:
+            path.write_text(f"file,{name}\na.csv,{cell}\n")
+            said = f"looks like a setting and is none; allowed is '{meant}' for a column that sets "
+            said += "it, in SI units, or a name unlike a setting's."
+            assert refused(path) == [f"{path}, line 1, column '{name}': {said}"]

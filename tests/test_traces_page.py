@@ -144,8 +144,9 @@ def test_of_very_many_traces_there_is_the_table_and_the_page_says_so(
     for trace in traces:
         write_drop(trace, 0)
     monkeypatch.setattr(command, "MOST_DRAWN", 1)
-    model = [Setting("--model", ("sample", "model"), "maxwell")]
-    assert command.identify_files(traces, few, model, report=tmp_path / "page.html") == 0
+    alone = {("sample", "model"): "maxwell", ("model_selection", "models"): []}
+    given = [Setting("--set", *own) for own in alone.items()]
+    assert command.identify_files(traces, few, given, report=tmp_path / "page.html") == 0
     text = (tmp_path / "page.html").read_text()
     assert text.count("<img") == 1
     assert "Too many traces for pictures" in text

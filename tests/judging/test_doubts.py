@@ -141,9 +141,8 @@ def test_fast_noise_is_neither_smooth_nor_in_one_place(noise: str, fast: bool) -
     assert has_fast_noise(residuals, left_by(noise), np.ones((1, 400))) == fast
 
 
-@pytest.mark.parametrize(
-    ("share", "time_s", "error", "walk", "said"),
-    [
+def test_share_and_time_less_its_error_decide() -> None:
+    for share, time_s, error, walk, said in (
         (0.6, 10.0, 0.0, 0.0, "is correlated over 10 s of a trace of 400 s, 60 % of its variance"),
         # Two standard deviations of the time below it are 8 s, a fiftieth of the trace, or less.
         (0.6, 10.0, 0.1, 0.0, "is correlated over 10 s"),
@@ -155,15 +154,11 @@ def test_fast_noise_is_neither_smooth_nor_in_one_place(noise: str, fast: bool) -
         # Odds of two, of which two standard deviations leave 0.54, more than a half, or 0.49.
         (0.1, 400.0, 0.65, 2 / 3, "walks at random, 67 % of its variance"),
         (0.1, 400.0, 0.7, 2 / 3, ""),
-    ],
-)
-def test_share_and_time_less_its_error_decide(
-    share: float, time_s: float, error: float, walk: float, said: str
-) -> None:
-    noise_model = NoiseModel(share, time_s, 0.0, walk=walk)
-    note = find_slow_misfit(noise_model, (error, error), 400.0, 0.03, lambda: "it is so")
-    assert (note is not None) == bool(said)
-    assert note is None or (note.weight == DOUBT and said in note.text)
+    ):
+        noise_model = NoiseModel(share, time_s, 0.0, walk=walk)
+        note = find_slow_misfit(noise_model, (error, error), 400.0, 0.03, lambda: "it is so")
+        assert (note is not None) == bool(said)
+        assert note is None or (note.weight == DOUBT and said in note.text)
 
 
 @pytest.mark.nightly
