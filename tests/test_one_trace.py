@@ -322,6 +322,9 @@ def test_advice_is_given_of_a_rejected_fit_alone() -> None:
     lines = in_columns([found | rejected, found], {}).splitlines()
     assert [line for line in lines if "Try" in line] == [f"{EXAMPLE}: Try another."]
     assert f"{EXAMPLE}: rejected: It is wrong." in lines
+    (row,) = (line for line in lines if "  ok  " in line)
+    assert "  21.6 (16.9 to 26.6)  5.01 " in row
+    assert "  ≤ 9.2  " in row
 
 
 def test_colours_are_not_for_all_terminals(monkeypatch: pytest.MonkeyPatch) -> None:

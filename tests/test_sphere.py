@@ -91,7 +91,7 @@ def test_a_number_counts_by_its_power_and_back() -> None:
 def test_what_no_sphere_is_told_by_is_refused(afm: Path) -> None:
     for given, said in (
         ("2.5 --hold 1nN", "found '2.5', allowed is a radius with its unit"),
-        ("2.5Pa --hold 1nN", "found '2.5Pa', allowed is a radius"),
+        *((f"{it} --hold 1nN", f"found '{it}', allowed is a radius") for it in ("2.5Pa", "0um")),
         ("2um --hold 500", "--hold: found no unit, allowed are m, cm, mm, um"),
         ("2um --hold 1nN", "the unit 'nN' of a"),
         ("2um --reading modulus=force_nN", "goes with a force or an indentation, not with modulus"),
