@@ -238,6 +238,15 @@ def test_what_lags_add_at_4_s() -> None:
     }
 
 
+def test_other_starts_widen_limits_of_what_all_of_them_tell() -> None:
+    told, found = Told("G(1 s)", LEVEL, 1.0, "Pa", 15.0, 14.0, 16.0), tell(TIMES, zener(TIMES))
+    own, other, none = (
+        replace(found, told=each) for each in ([told], [replace(told, low=13.0, high=15.5)], [])
+    )
+    assert own.widened([other]).told == [replace(told, low=13.0, high=16.0)]
+    assert own.widened([other, none]).told == [replace(told, value=None, low=None, high=None)]
+
+
 def test_times_at_which_it_is_told() -> None:
     assert decades(0.3, 80.0) == [1.0, 10.0]
     assert decades(3.0, 80.0) == [5.0, 10.0, 20.0, 50.0]
