@@ -76,6 +76,7 @@ def test_a_declared_offset_and_drift_are_fitted_along() -> None:
     few, clear = times[::4], (response + 5e-4 + 1e-6 * times)[::4]
     exact = told(few, clear, offset=True, drift=True, model="liquid_drop").data
     assert exact["drift_rad_per_s"] == pytest.approx(1e-6, rel=1e-3)
+    assert exact["offset_rad"] == pytest.approx(5e-4, rel=1e-3)
 
 
 def test_options_are_keys_of_the_config_and_the_last_one_counts(tmp_path: Path) -> None:
