@@ -64,6 +64,9 @@ def test_the_example_gives_its_truth() -> None:
     assert said.count("97.5 %") == 1
     header, (row,) = table_of(Outcome([found], {}, copied={found["trace"]: {}}))
     assert row[header.index("preferred_model")] == found["preferred_model"] == "liquid_drop"
+    # Of any linear sample levels and exponents alone.
+    assert "K(10 s) value (N/m)" in header
+    assert not [name for name in header if "rad/s" in name]
 
 
 def test_a_declared_offset_and_drift_are_fitted_along() -> None:
