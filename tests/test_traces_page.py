@@ -103,6 +103,10 @@ def test_the_figure_is_by_the_words_of_the_table(dish: Outcome) -> None:
     assert len(points) == 12 - 2
     assert sum(line.get_marker() == "^" for line in points) == 1
     assert sum(line.get_markerfacecolor() == "white" for line in points) == 1
+    # By units the chance is another one than by cells.
+    by_cell = {name: {"drug": own["drug"]} for name, own in words.items()}
+    others = draw_traces(replace(dish, copied=by_cell), columns_of(dish.found))[0].axes[0].texts
+    assert [it.get_text() for it in axes.texts] != [it.get_text() for it in others]
     words[dish.found[0]["trace"]] = {"other": "of another table"}
     assert draw_traces(replace(dish, copied=words), columns_of(dish.found))[0].axes
     drawn, said = draw_traces(dish, columns_of(dish.found))
