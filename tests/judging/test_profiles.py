@@ -263,6 +263,9 @@ def test_a_set_in_two_parts_has_a_gap_that_its_verdict_names() -> None:
     whole = Profile(values, parabolas(values), 2.0, -3.0, 3.0, np.zeros(4))
     others: tuple[dict[str, Any], ...] = ({}, {"gaps": (gap,)}, {"high": None}, {"low": None})
     said = [Finding(QUANTITIES[0], replace(whole, **other), 0.1).words() for other in others]
+    gapped = Finding(QUANTITIES[0], replace(whole, gaps=(gap,)), 0.1)
+    allowed = [gapped.allows(np.full(4, at)) for at in (-4.0, 0.0, 2.0, 4.0)]
+    assert allowed == [False, False, True, False]
     determined = "determined only to 2.6 decades: 7.4 N/m (0.05 to 20)"
     assert said == [
         determined,
