@@ -36,13 +36,8 @@ from tests.published_numbers import renewed_numbers
 from workflow.paper.claims import Results, add_columns, judge_all
 
 _CASES = {"endothelial_cell": "the cell", "liquid_drop_1": "drop 1", "liquid_drop_2": "drop 2"}
-_JUDGED_IN_NOISE = (
-    (("liquid_drop_1", "liquid_drop_2"), "c + c_p"),
-    (("liquid_drop_2",), "k"),
-    (("liquid_drop_1",), "k"),
-    (("endothelial_cell",), "k"),
-    (("endothelial_cell",), "k_p"),
-)
+_JUDGED_IN_NOISE = [("drop", "c + c_p"), ("drop 2", "k"), ("drop 1", "k")]
+_JUDGED_IN_NOISE += [("the cell", "k"), ("the cell", "k_p")]
 # Of the independent fit of HL60's stretch, and of pyRheo's demonstrations.
 _MEASURED = {
     "hl60": {"alpha": 0.701},
@@ -113,8 +108,9 @@ def choices() -> str:
     rows = []
     for reading, mine in table.groupby("reading", sort=False):
         own = mine.set_index("case")
-        row = {"interpretation": str(reading), "runs": str(own["seeds"]["endothelial_cell"])}
-        row |= {"cell near the noise": _share(own.loc["endothelial_cell"], "near_noise")}
+        cell = own.loc["endothelial_cell"]
+        row = {"interpretation": str(reading), "runs": str(cell["seeds"])}
+        row |= {"cell near the noise": _share(cell, "near_noise")}
         for heading, (quantity, case) in errors.items():
             row[heading] = f"{own.loc[case, f'error_percent {quantity}']:.2g} %"
         rows.append(row)
@@ -196,9 +192,10 @@ def _limits_of(row: dict[str, str]) -> str:
 def errors_by_noise() -> str:
     table = pd.read_csv(_path("robustness_noise", "robustness"))
     rows = []
-    for cases, quantity in _JUDGED_IN_NOISE:
+    for whose, quantity in _JUDGED_IN_NOISE:
+        cases = [name for name, of in _CASES.items() if whose in of]
         ours = table[table["case"].isin(cases) & (table["quantity"] == quantity)]
-        row = {"quantity": f"{quantity} of {_CASES[cases[0]] if len(cases) == 1 else 'both drops'}"}
+        row = {"quantity": f"{quantity} of {'both drops' if whose == 'drop' else whose}"}
         for level in (2, 10, 40):
             of = ours[ours["row"] == level]
             error, bound = (of[it] for it in ("error_genetic", "bound_percent"))
@@ -252,10 +249,8 @@ def _share(row: Any, name: str) -> str:
 
 
 def _range(values: "pd.Series[float]", how: str, unit: str = "") -> str:
-    if np.isinf(values.max()):
-        return "none"
-    low, high = format(values.min(), how), format(values.max(), how)
-    return f"{low}{unit}" if low == high else f"{low}–{high}{unit}"
+    ends = dict.fromkeys(format(end, how) for end in (values.min(), values.max()))
+    return "none" if np.isinf(values.max()) else f"{'–'.join(ends)}{unit}"
 
 
 @cache

@@ -122,15 +122,10 @@ def test_flow_under_a_constant_load_is_said_to_look_like_a_drift(noise_model: st
         assert "of c and the drift that is fitted along, only the sum is determined" in str(found)
 
 
-@pytest.mark.parametrize(
-    ("model", "fixed", "dampers"),
-    [
+def test_dampers_without_a_spring_beside_them_let_a_sample_flow() -> None:
+    for model, fixed, dampers in (
         *(("maxwell", (), "c"), ("burgers", (), "c_s"), ("zener_maxwell", (), "")),
         ("generalized_maxwell", ("k_p",), "c + c_p"),
-    ],
-)
-def test_dampers_without_a_spring_beside_them_let_a_sample_flow(
-    model: str, fixed: tuple[str, ...], dampers: str
-) -> None:
-    creep = set_up(INSTRUMENTS["strain"], (hold(120.0, 1.0),), Sample(model))
-    assert flow_of(replace(creep, fixed=dict.fromkeys(fixed, 0.0))) == dampers
+    ):
+        creep = set_up(INSTRUMENTS["strain"], (hold(120.0, 1.0),), Sample(model))
+        assert flow_of(replace(creep, fixed=dict.fromkeys(fixed, 0.0))) == dampers

@@ -445,6 +445,9 @@ def test_points_lie_where_the_numbers_are() -> None:
     assert levels == pytest.approx([90.0, *(np.exp(it.known["k"][0]) for it in cells[1:])])
     assert [line.get_marker() for line in points] == ["v", *["o"] * 59]
     assert len(axes.lines) == 60 + 6
+    ((low, high), *_) = axes.collections[0].get_segments()
+    ends = [np.exp(cells[1].known["k"][0] + side * 1.96 * 0.05) for side in (-1, 1)]
+    assert [low[1], high[1]] == pytest.approx(ends, rel=1e-4)
     told = [text.get_text() for text in axes.texts]
     assert f"p = {compared['k', 'b']['p']:.2g}" in told[0]
     assert axes.get_ylabel() == "k (N/m)"

@@ -3,16 +3,13 @@ import re
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
-import yaml
 
 from biogrip.arrays import Array
 from biogrip.library import Sample, set_up, simulate
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.protocol import hold
-from tests.helpers.identified import by_quantity, identify, told, write_trace
-from tests.helpers.places import ROOT
+from tests.helpers.identified import by_quantity, identify, write_trace
 
 SOLID = Sample("zener_maxwell")
 TRUTH = {"k": 300.0, "k_p": 200.0, "c": 900.0}
@@ -64,15 +61,3 @@ def test_every_reading_is_identified_in_its_own_units_and_words(
     written = page.read_text() if page.exists() else ""
     for said in (printed, json.dumps(found), NOT_READ.sub("", written), table.read_text()):
         assert not OF_A_GRIPPER.search(said), OF_A_GRIPPER.search(said)
-
-
-@pytest.mark.nightly
-def test_the_power_law_of_a_cell_in_an_optical_stretcher() -> None:
-    """The exponent is that of a published, independent fit."""
-    config = yaml.safe_load((ROOT / "config/measured.yaml").read_text())["cases"]["hl60"]
-    given = {key: config[key] for key in ("instrument", "protocol")}
-    trace = pd.read_csv(ROOT / "data/measured/hl60.csv")
-    found = told(trace["time_s"], trace["strain"], reads="strain", model="springpot", config=given)
-    alpha = found.to_frame().loc["alpha"]
-    assert alpha["value"] == pytest.approx(0.701, abs=0.011)
-    assert alpha["low"] < 0.701 < alpha["high"]

@@ -18,7 +18,7 @@ import yaml
 from biogrip.arrays import Array
 from biogrip.cli import _parser, main
 from biogrip.command.options import Setting
-from biogrip.command.outputs import WRITTEN_BY
+from biogrip.command.outputs import WRITTEN_BY, Outcome, table_of
 from biogrip.command.settings import Asked, case_of
 from biogrip.command.words import for_a_paper, in_columns, noise_in_words
 from biogrip.errors import BiogripError
@@ -59,6 +59,11 @@ def test_the_example_gives_its_truth() -> None:
     # It is of a drop with a membrane; its parallel damper does not show.
     assert "A simpler model, Maxwell liquid drop with membrane stiffness (--model liquid_" in said
     assert said.count("97.5 %") == 1
+    header, (row,) = table_of(Outcome([found], {}, copied={found["trace"]: {}}))
+    assert row[header.index("preferred_model")] == found["preferred_model"] == "liquid_drop"
+    # Of any linear sample levels and exponents alone.
+    assert "K(10 s) value (N/m)" in header
+    assert not [name for name in header if "rad/s" in name]
 
 
 def test_models_are_spared_that_cannot_suit_the_trace_better(tmp_path: Path) -> None:
@@ -85,8 +90,10 @@ def test_a_declared_offset_and_drift_are_fitted_along() -> None:
     assert found.data["offset_rad"] == pytest.approx(5e-4, abs=1e-4)
     assert found.data["drift_rad_per_s"] == pytest.approx(1e-6, abs=1e-6)
     assert "χ² falls" not in str(found)
-    exact = told(times, response + 5e-4 + 1e-6 * times, offset=True, drift=True).data
+    few, clear = times[::4], (response + 5e-4 + 1e-6 * times)[::4]
+    exact = told(few, clear, offset=True, drift=True, model="liquid_drop").data
     assert exact["drift_rad_per_s"] == pytest.approx(1e-6, rel=1e-3)
+    assert exact["offset_rad"] == pytest.approx(5e-4, rel=1e-3)
 
 
 def test_options_are_keys_of_the_config_and_the_last_one_counts(tmp_path: Path) -> None:
@@ -109,8 +116,9 @@ def test_what_is_recognised_in_an_export_is_said_unless_quiet(
     tmp_path: Path, few: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     trace = Path(shutil.copy(EXPORT, tmp_path / "gel.csv"))
-    options = "--time Time --start 24 --model maxwell --set measurement.block=3 --reading"
-    given: list[str | Path] = ["--config", few, *options.split(), "modulus=Relaxation Modulus"]
+    options = "--time Time --start 24 --model maxwell --set measurement.block=3 --no-compare"
+    reading = "--reading", "modulus=Relaxation Modulus"
+    given: list[str | Path] = ["--config", few, *options.split(), *reading]
     status, _, said = identify(trace, *given)
     assert status == 0
     assert "gel.csv is read as\n  encoding     UTF-16\n  separator    tabs\n" in said
@@ -258,11 +266,12 @@ def test_a_trace_whose_fit_fails_costs_no_other_its_result(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A fault of ours, here of a test that only adds notes: a row says why, alone one message."""
-    good, bad = Path(shutil.copy(EXAMPLE, tmp_path / "good.csv")), tmp_path / "bad.csv"
-    bad.write_text("".join(EXAMPLE.read_text().splitlines(keepends=True)[:200]))
+    good, bad = tmp_path / "good.csv", tmp_path / "bad.csv"
+    write_drop(good, 0)
+    bad.write_text("".join(good.read_text().splitlines(keepends=True)[:60]))
 
     def fails(problem: Any, time_s: Array, *given: Any, **more: Any) -> Any:
-        if len(time_s) < 200:
+        if len(time_s) < 60:
             raise ValueError("min() arg is an empty sequence")
         return notes_on_start(problem, time_s, *given, **more)
 
@@ -331,6 +340,9 @@ def test_advice_is_given_of_a_rejected_fit_alone() -> None:
     lines = in_columns([found | rejected, found], {}).splitlines()
     assert [line for line in lines if "Try" in line] == [f"{EXAMPLE}: Try another."]
     assert f"{EXAMPLE}: rejected: It is wrong." in lines
+    (row,) = (line for line in lines if "  ok  " in line)
+    assert "  21.6 (16.9 to 26.6)  5.01 " in row
+    assert "  ≤ 9.2  " in row
 
 
 def test_a_terminal_sees_every_phase(tmp_path: Path, few: Path) -> None:
@@ -340,13 +352,14 @@ def test_a_terminal_sees_every_phase(tmp_path: Path, few: Path) -> None:
         shown.append(os.read(screen, 65536))
         return shown[-1]
 
-    command = [sys.executable, "-m", "biogrip", "identify", str(EXAMPLE), "--config", str(few)]
+    write_drop(trace := tmp_path / "drop.csv", 0)
+    command = [sys.executable, "-m", "biogrip", "identify", str(trace), "--config", str(few)]
     assert pty.spawn([*command, "--output", str(tmp_path / "found.json")], read) == 0
     said = b"".join(shown).decode()
-    for phase in ("fitting 801 samples", "finding confidence limits", "trying other sample models"):
+    for phase in ("fitting 120 samples", "finding confidence limits", "trying other sample models"):
         assert phase in said
     # The line of the phases is gone before anything is told.
-    assert "\r\x1b[K" in said.split(str(EXAMPLE))[-2]
+    assert "\r\x1b[K" in said.split(str(trace))[-2]
 
 
 def test_only_what_can_be_published_is_said_for_a_paper() -> None:

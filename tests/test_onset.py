@@ -9,14 +9,11 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.judging.diagnosis import RING
-from biogrip.judging.doubts import DOUBT, Note
 from biogrip.judging.onset import (
     OnsetFits,
     begins_constant,
     estimate_onset,
     is_cut_off,
-    profile_over_onset,
 )
 from biogrip.library import Sample, TraceResult, set_up, simulate
 from biogrip.physics.instruments import INSTRUMENTS
@@ -91,17 +88,6 @@ def test_an_onset_is_fitted_on_any_clock(clock: str) -> None:
     fits = OnsetFits(creep, times, exact + noise)
     best, true = fits.best(float(times[0])), fits.at(0.0, np.log([*truth.values()]))
     assert best.misfit <= true.misfit * (1 + 1e-9)
-
-
-@pytest.mark.nightly
-def test_readings_near_a_fitted_onset_are_not_said_to_show_a_ring() -> None:
-    """Of milliseconds, where the onset is known to tenths of a second."""
-    times, values = late(2)
-    given = gripped(times, values, start=ONSET_S).diagnosis
-    kept, ring = Note(DOUBT, "Something else."), Note(DOUBT, f"{RING}: what inertia does.")
-    found, ends = profile_over_onset(replace(given, notes=[kept, ring]), times - ONSET_S)
-    assert ends[1] - ends[0] > 0.05
-    assert found.notes == [kept]
 
 
 def test_padding_before_the_onset_is_no_measurement() -> None:

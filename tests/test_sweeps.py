@@ -16,9 +16,11 @@ from biogrip.command.settings import Asked, read_trace
 from biogrip.command.words import set_up_in_words
 from biogrip.errors import BiogripError
 from biogrip.fit.any_sample import swept_deviations
+from biogrip.judging.whiteness import find_inertia
 from biogrip.library import INSTRUMENTS, Sample, hold, set_up, simulate
 from biogrip.physics.models import MODELS
 from biogrip.physics.protocol import joined
+from tests.helpers.default import seen
 from tests.helpers.identified import by_quantity, identified, identify, told, write_trace
 from tests.helpers.laplace import IMPEDANCES
 
@@ -63,34 +65,9 @@ def test_every_model_has_the_moduli_of_its_impedance_and_their_slopes(name: str)
         assert np.max(np.abs((ahead - behind) / (2 * step) - slope)) < 1e-7 * size.max()
 
 
-# Chia pudding, of pyRheo's demos (github.com/mirandi1/pyRheo): rad/s, storage and loss in Pa.
-CHIA = """
-100.0 178.11 228.46
-67.2 162.94 150.62
-45.2 141.52 111.45
-30.4 126.71 89.679
-20.4 114.69 71.74
-13.7 102.99 58.214
-9.24 93.067 47.552
-6.21 84.661 39.135
-4.18 77.922 32.367
-2.81 72.247 26.874
-1.89 67.459 22.624
-1.27 63.488 19.183
-0.853 60.003 16.489
-0.574 57.062 14.478
-0.386 54.359 12.787
-0.259 51.938 11.575
-0.174 49.803 10.606
-0.117 47.783 10.035
-0.0788 45.808 9.1633
-0.053 44.263 9.4928
-0.0356 42.635 9.5032
-0.024 40.681 9.5656
-0.0161 39.425 9.238
-0.0108 37.572 10.513
-0.00728 36.24 9.943
-"""
+def measured(sweep: str) -> Array:
+    """Frequencies, storage and loss moduli, by row."""
+    return np.loadtxt(Path(__file__).parent / "sweeps" / f"{sweep}.csv", delimiter=",").T
 
 
 def from_file(folder: Path, omega: Array, values: Array, sd: Array, model: str) -> dict[str, Any]:
@@ -113,7 +90,7 @@ def of_zener() -> Array:
     ("sweep", "model", "published", "least"),
     [
         (
-            np.array([line.split() for line in CHIA.split("\n")[1:-1]], float).T,
+            measured("chia"),
             "springpots_in_parallel",
             (5.058804241414604, 0.7952219412109002, 65.25716756871952, 0.1278221383939005),
             0.32976417668768987,
@@ -140,25 +117,10 @@ def test_a_published_fit_has_its_misfit_and_lies_within_limits_about_a_lower_one
         assert found[name]["low"] < value < found[name]["high"]
 
 
-# A sweep in RHEOS's documentation, by angular frequency: storage and loss modulus.
-RHEOS = np.array(
-    [
-        [0.091160329, 0.828556819, 0.149921737],
-        [0.304963687, 0.862943457, 0.142491695],
-        [0.77022935, 0.898757203, 0.151197212],
-        [4.24686265, 0.974905392, 0.182173688],
-        [9.175279817, 1.036221356, 0.210393172],
-        [29.44212077, 1.124016346, 0.313294598],
-        [103.7540299, 1.244293227, 0.552659563],
-        [309.5187241, 1.494145654, 1.070122282],
-        [1003.289067, 3.170324762, 1.871798151],
-    ]
-).T
-
-
 def test_the_fit_that_rheos_publishes_has_its_misfit_and_lies_within_the_limits() -> None:
     """That is of logarithms, ours of relative deviations."""
-    omega, values, published = RHEOS[0], RHEOS[1:], (0.00921903, 0.770062, 0.913296, 0.100392)
+    sweep, published = measured("rheos"), (0.00921903, 0.770062, 0.913296, 0.100392)
+    omega, values = sweep[0], sweep[1:]
     logs = np.log(moduli("springpots_in_parallel", omega, *published) / values)
     assert np.sum(logs**2) == pytest.approx(0.34215629, rel=2e-5)
     found = swept(values, omega, model="springpots_in_parallel", noise_share=0.14).to_frame()
@@ -213,25 +175,20 @@ def test_files_of_instruments_tell_the_same(tmp_path: Path, name: str) -> None:
     np.testing.assert_allclose([storage, loss[::-1]], values, rtol=3e-8)
 
 
-@pytest.mark.parametrize(
-    ("header", "options", "said"),
-    [
+def test_what_a_sweep_cannot_have_is_refused(tmp_path: Path) -> None:
+    for header, options, said in (
         ("w,G' (Pa),G'' (Pa)", [], "column 'w': found no unit"),
         ("frequency (1/s),G' (Pa),G'' (Pa)", [], "found the unit 1/s; allowed are rad/s or Hz"),
         ("w (rad/s),G' (Pa),G'' (Pa)", ["--hold", "1"], "is of a trace in time, not of a sweep"),
         ("w (rad/s),G' (Pa),G'' (Pa)", ["--drift"], "this is a frequency sweep; leave it out"),
         ("w (rad/s),G' (Pa),G'' (Pa)", ["--reading", "phase=x"], "found loss and phase"),
         ("w (rad/s),G' (Pa),G'' (Pa)", ["--sd", "x"], "both moduli need deviations"),
-    ],
-)
-def test_what_a_sweep_cannot_have_is_refused(
-    tmp_path: Path, header: str, options: list[str], said: str
-) -> None:
-    trace = write_trace(tmp_path / "sweep.csv", OMEGA, *solid(), header=header)
-    names = header.split(",")
-    given = ["--frequency", names[0], "--reading", f"storage={names[1]}"]
-    status, _, complained = identify(trace, *given, "--reading", f"loss={names[2]}", *options)
-    assert (status, said in complained) == (1, True), complained
+    ):
+        trace = write_trace(tmp_path / "sweep.csv", OMEGA, *solid(), header=header)
+        names = header.split(",")
+        given = ["--frequency", names[0], "--reading", f"storage={names[1]}"]
+        status, _, complained = identify(trace, *given, "--reading", f"loss={names[2]}", *options)
+        assert (status, said in complained) == (1, True), complained
 
 
 @pytest.mark.parametrize(
@@ -310,3 +267,11 @@ def test_moduli_that_do_not_belong_to_one_sample_are_told(
         # 1 or 0.4 Pa s^2 take 10 or 4 kPa from the 35 kPa at 100 rad/s; the fit takes up a part.
         percent = float(re.findall(r", (\S+) % at the highest", reason)[0])
         assert 0.3 < percent / (100 * inertia * 1e4 / wrong[0, -1]) < 1.5
+
+
+def test_inertia_is_said_as_a_share_of_the_highest_storage_modulus() -> None:
+    """Of 2 omega^2 at 3 rad/s, beside a loss that no inertia has: 18 over 357.2 is 5.04 %."""
+    places = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])
+    residual = np.array([0.1, 0.0, 0.0, 2.0, 8.0, 18.0])
+    read = seen(time_s=places, readings=[357.2], condensed=seen(cleared=lambda rows: rows))
+    assert ", 5 % at" in find_inertia(seen(trace=read), residual, np.zeros((0, 6)))

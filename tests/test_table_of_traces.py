@@ -79,7 +79,8 @@ def test_a_trace_may_stand_beside_a_table_that_does_not_name_it(here: Path) -> N
     write(here / "cells.tsv", HEADER, OTHER)
     status, printed, _ = identify("usual.csv", "cells.tsv", "--csv", "found.csv")
     assert status == 0
-    assert "\nusual.csv: Assumed: the default study's gripper and the default study's" in printed
+    assumed = "the default study's gripper and the default study's protocol (200 s at 1.6e-09 N m, "
+    assert f"\nusual.csv: Assumed: {assumed}200 s at 3.2e-10 N m); give" in printed
     assert "other.csv: Assumed" not in printed
     rows = Path("found.csv").read_text().splitlines()
     starts = ["trace,dish,fit,", "usual.csv,,ok,", "other.csv,right,ok,"]
@@ -221,14 +222,18 @@ def test_a_killed_process_costs_a_batch_its_trace_alone(
             os.kill(os.getpid(), signal.SIGKILL)
         return whole(asked, outputs, drawn=drawn)
 
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0})
+    # Traces of one batch, each with limits of its own.
+    of_each = f"{HEADER}|identifiability.confidence", "usual.csv|left||||0.9", f"{OTHER}|"
+    write(here / "cells.tsv", *of_each)
     undisturbed = identify("cells.tsv", "--csv", "first.csv")
+    assert [row["confidence"] for row in listed("first.csv")] == ["0.9", "0.95"]
     results = {name: found(name) for name in ("usual.csv", "other.csv")}
     for path in here.glob("*.json"):
         path.unlink()
     with monkeypatch.context() as patched:
         # Killed is every process that is to identify that trace, with all others of its batch.
         patched.setattr(command, "identify_batch", killed)
-        patched.setattr(os, "sched_getaffinity", lambda _: {0})
         status, printed, said = identify("cells.tsv", "--csv", "found.csv")
     assert status == 1
     assert "its traces are identified one by one." in said
@@ -316,22 +321,17 @@ def test_an_option_is_a_column_too_and_words_are_no_setting(tmp_path: Path) -> N
     assert list(read_table(path)[0].copied) == alike + others
 
 
-@pytest.mark.parametrize(
-    ("meant", "names", "cell"),
-    [
+def test_what_looks_like_a_setting_is_not_copied_beside_the_result(tmp_path: Path) -> None:
+    for meant, names, cell in (
         ("gripper.arm_length_m", ("arm_length_m", "Arm length", "gripper_arm_lenght_m"), "1"),
         ("hold", ("stress_Pa", "hold_Pa", "hodl", "pressure_mbar", "Force (pN)"), "1"),
         *(("hold", ["stress"], "8 Pa"), ("start", ["start_s"], "1")),
         *(("noise", ["noise (rad)", "noize"], "1"), ("noise_model", ["noise_modle"], "coloured")),
         ("model", ["modle", "sample type"], "sls"),
-    ],
-)
-def test_what_looks_like_a_setting_is_not_copied_beside_the_result(
-    tmp_path: Path, meant: str, names: list[str], cell: str
-) -> None:
-    path = tmp_path / "cells.csv"
-    for name in names:
-        path.write_text(f"file,{name}\na.csv,{cell}\n")
-        said = f"looks like a setting and is none; allowed is '{meant}' for a column that sets it, "
-        said += "in SI units, or a name unlike a setting's."
-        assert refused(path) == [f"{path}, line 1, column '{name}': {said}"]
+    ):
+        path = tmp_path / "cells.csv"
+        for name in names:
+            path.write_text(f"file,{name}\na.csv,{cell}\n")
+            said = f"looks like a setting and is none; allowed is '{meant}' for a column that sets "
+            said += "it, in SI units, or a name unlike a setting's."
+            assert refused(path) == [f"{path}, line 1, column '{name}': {said}"]

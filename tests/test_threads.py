@@ -1,10 +1,14 @@
 """BLAS threads: the products of small matrices that fits make are slower with several."""
 
-import os
 import subprocess
 import sys
+from typing import Any
 
-from tests.helpers.places import ROOT
+import numpy as np
+import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
+
+from biogrip import library
 
 OPTIONS = """
 import sys
@@ -23,46 +27,34 @@ parser.parse_args(["design", "my.yaml"])
 assert "numpy" not in sys.modules
 """
 
-NOTEBOOK = """
-import numpy as np
-import pytest
-from threadpoolctl import threadpool_info
 
-import biogrip
-from biogrip import library
-
-def threads():
+def threads() -> set[int]:
     return {each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"}
 
-def tell(*given, **more):
-    raise biogrip.BiogripError(f"threads: {threads()}")
 
-before, time_s = threads(), np.arange(1, 30.0)
-trace = time_s, 2 - np.exp(-time_s)
-library.read_trace = library.identify_many = library.diagnose = tell
-held, model = (biogrip.hold(30.0, 1.0),), biogrip.Sample("liquid_drop")
-creep = biogrip.set_up(biogrip.INSTRUMENTS["strain"], held, model)
-for use in (
-    lambda: biogrip.identify_trace(*trace, reads="strain", hold=1.0),
-    lambda: biogrip.identify_sample(creep, *trace),
-    lambda: biogrip.judge(creep, *trace, None),
-):
-    with pytest.raises(biogrip.BiogripError, match="threads: .1.$"):
-        use()
-    assert threads() == before
-"""
-
-
-def run(code: str, threads: str | None = None) -> None:
-    given = {name: it for name, it in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
-    given |= {} if threads is None else {"OPENBLAS_NUM_THREADS": threads}
-    subprocess.run([sys.executable, "-c", code], env=given, cwd=ROOT, check=True)
+def tell(*given: Any, **more: Any) -> Any:
+    raise library.BiogripError(f"threads: {threads()}")
 
 
 def test_reading_an_option_loads_no_numpy() -> None:
     """So that the command limits the threads before NumPy starts them, whatever is typed."""
-    run(OPTIONS)
+    subprocess.run([sys.executable, "-c", OPTIONS], check=True)
 
 
-def test_a_notebook_that_has_threads_keeps_them_and_fits_with_one() -> None:
-    run(NOTEBOOK, threads="2")
+def test_a_notebook_that_has_threads_keeps_them_and_fits_with_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    time_s, held = np.arange(1, 30.0), (library.hold(30.0, 1.0),)
+    creep = library.set_up(library.INSTRUMENTS["strain"], held, library.Sample("liquid_drop"))
+    for name in ("read_trace", "identify_many", "diagnose"):
+        monkeypatch.setattr(library, name, tell)
+    trace: tuple[Any, Any] = time_s, 2 - np.exp(-time_s)
+    with threadpool_limits(2, "blas"):
+        for use in (
+            lambda: library.identify_trace(*trace, reads="strain", hold=1.0),
+            lambda: library.identify_sample(creep, *trace),
+            lambda: library.judge(creep, *trace, None),  # type: ignore[arg-type]
+        ):
+            with pytest.raises(library.BiogripError, match=r"threads: .1.$"):
+                use()
+            assert threads() == {2}

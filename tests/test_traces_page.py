@@ -104,6 +104,10 @@ def test_the_figure_is_by_the_words_of_the_table(dish: Outcome) -> None:
     assert len(points) == 12 - 2
     assert sum(line.get_marker() == "^" for line in points) == 1
     assert sum(line.get_markerfacecolor() == "white" for line in points) == 1
+    # By units the chance is another one than by cells.
+    by_cell = {name: {"drug": own["drug"]} for name, own in words.items()}
+    others = draw_traces(replace(dish, copied=by_cell), columns_of(dish.found))[0].axes[0].texts
+    assert [it.get_text() for it in axes.texts] != [it.get_text() for it in others]
     words[dish.found[0]["trace"]] = {"other": "of another table"}
     assert draw_traces(replace(dish, copied=words), columns_of(dish.found))[0].axes
     drawn, said = draw_traces(dish, columns_of(dish.found))
@@ -145,8 +149,9 @@ def test_of_very_many_traces_there_is_the_table_and_the_page_says_so(
     for trace in traces:
         write_drop(trace, 0)
     monkeypatch.setattr(command, "MOST_DRAWN", 1)
-    model = [Setting("--model", ("sample", "model"), "maxwell")]
-    assert command.identify_files(traces, few, model, report=tmp_path / "page.html") == 0
+    alone = {("sample", "model"): "maxwell", ("model_selection", "models"): []}
+    given = [Setting("--set", *own) for own in alone.items()]
+    assert command.identify_files(traces, few, given, report=tmp_path / "page.html") == 0
     text = (tmp_path / "page.html").read_text()
     assert text.count("<img") == 1
     assert "Too many traces for pictures" in text

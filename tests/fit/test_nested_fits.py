@@ -116,9 +116,8 @@ def test_a_simpler_model_fits_better_if_nine_digits_say_so() -> None:
 READINGS = 1000
 
 
-@pytest.mark.parametrize(
-    ("gained", "said"),
-    [
+def test_the_sentence_is_that_of_the_numbers() -> None:
+    for gained, said in (
         # chi-squared by which four parameters, and the others, fit better than a spring's one.
         ({"generalized_maxwell": 103.0, "liquid_drop": 102.0}, "A simpler model, Maxwell liqui"),
         ({"generalized_maxwell": 50.0, "fractional_maxwell": 400.0}, "is not adequate: fractional"),
@@ -128,17 +127,15 @@ READINGS = 1000
         # By chance another model of as many parameters, or a richer one, fits a little better.
         ({"generalized_maxwell": 90.0, "burgers": 95.9}, "none of the 2 models tried suits"),
         ({"generalized_maxwell": 90.0, "burgers": 96.1}, "less well: Burgers"),
-    ],
-)
-def test_the_sentence_is_that_of_the_numbers(gained: dict[str, float], said: str) -> None:
-    misfits = [float(np.exp(-gain / (2 * READINGS))) for gain in gained.values()]
-    tried = nested_fits.ranked(list(gained), misfits, READINGS)
-    assert said in nested_fits.advice(tried, "generalized_maxwell")
-    other = nested_fits.preferred(tried, "generalized_maxwell")
-    assert (other is None) == ("none of" in said)
-    words = "None of the 2 models tried is adequate: the best of them, "
-    inadequate = nested_fits.advice(tried, "generalized_maxwell", adequate=False)
-    assert inadequate.startswith(words) == (other is not None)
+    ):
+        misfits = [float(np.exp(-gain / (2 * READINGS))) for gain in gained.values()]
+        tried = nested_fits.ranked(list(gained), misfits, READINGS)
+        assert said in nested_fits.advice(tried, "generalized_maxwell")
+        other = nested_fits.preferred(tried, "generalized_maxwell")
+        assert (other is None) == ("none of" in said)
+        words = "None of the 2 models tried is adequate: the best of them, "
+        inadequate = nested_fits.advice(tried, "generalized_maxwell", adequate=False)
+        assert inadequate.startswith(words) == (other is not None)
 
 
 @pytest.mark.parametrize(("gained", "taken"), [(0.005, False), (0.02, True), (5.0, True)])

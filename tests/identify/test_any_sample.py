@@ -56,7 +56,7 @@ def test_five_lines_follow_a_model_that_fits() -> None:
 def test_table_and_page_have_it(tmp_path: Path, few: Path) -> None:
     trace, page = tmp_path / "a.csv", tmp_path / "page.html"
     write_trace(trace, SECONDS, SOFTENING + SCATTER, header="time_s,modulus_Pa")
-    given = ["--reading", "modulus=modulus_Pa", "--model", "zener_maxwell", "--at", "3,30"]
+    given = ["--reading", "modulus", "--model", "zener_maxwell", "--at", "3,30"]
     given += ["--csv", str(tmp_path / "found.csv"), "--report", str(page), "--config", str(few)]
     status, _, complained = identify(trace, *given, "--set", "model_selection.models=[]")
     assert status == 0, complained

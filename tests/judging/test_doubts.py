@@ -14,11 +14,13 @@ from biogrip.judging.doubts import (
     DOUBTFUL,
     HARMLESS,
     OK,
+    _about_growth,
     examine_residuals,
     find_slow_misfit,
     has_fast_noise,
 )
 from biogrip.judging.likelihood import make_likelihood
+from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.noise import AR1, Noise, NoiseModel, Outliers, add_noise
 from tests.helpers.default import seen
 from tests.helpers.identified import told
@@ -110,6 +112,15 @@ def test_a_stated_noise_that_the_fit_does_not_leave_is_told(
     assert all(said in note["text"] for note in notes)
 
 
+def test_noise_that_grows_has_a_share_of_what_is_read() -> None:
+    """A tenth of the readings is six times the others, with noise of 2 % of each."""
+    growth = np.repeat([2.0, 12.0], [90, 10])
+    read = seen(instrument=INSTRUMENTS["modulus"], coloured=False, response=lambda _: 200 * growth)
+    (said,) = _about_growth(growth, 4.0, read, np.zeros(1))
+    assert "it is 6 times as large for the largest tenth of the readings" in said
+    assert said.endswith("weighted by --noise-share 0.02.")
+
+
 def left_by(noise: str) -> Array:
     """Four hundred residuals: of fast noise, with a burst of it, or of a smooth misfit."""
     time_s, rng = np.arange(400.0), np.random.default_rng(0)
@@ -130,9 +141,8 @@ def test_fast_noise_is_neither_smooth_nor_in_one_place(noise: str, fast: bool) -
     assert has_fast_noise(residuals, left_by(noise), np.ones((1, 400))) == fast
 
 
-@pytest.mark.parametrize(
-    ("share", "time_s", "error", "walk", "said"),
-    [
+def test_share_and_time_less_its_error_decide() -> None:
+    for share, time_s, error, walk, said in (
         (0.6, 10.0, 0.0, 0.0, "is correlated over 10 s of a trace of 400 s, 60 % of its variance"),
         # Two standard deviations of the time below it are 8 s, a fiftieth of the trace, or less.
         (0.6, 10.0, 0.1, 0.0, "is correlated over 10 s"),
@@ -144,15 +154,11 @@ def test_fast_noise_is_neither_smooth_nor_in_one_place(noise: str, fast: bool) -
         # Odds of two, of which two standard deviations leave 0.54, more than a half, or 0.49.
         (0.1, 400.0, 0.65, 2 / 3, "walks at random, 67 % of its variance"),
         (0.1, 400.0, 0.7, 2 / 3, ""),
-    ],
-)
-def test_share_and_time_less_its_error_decide(
-    share: float, time_s: float, error: float, walk: float, said: str
-) -> None:
-    noise_model = NoiseModel(share, time_s, 0.0, walk=walk)
-    note = find_slow_misfit(noise_model, (error, error), 400.0, 0.03, lambda: "it is so")
-    assert (note is not None) == bool(said)
-    assert note is None or (note.weight == DOUBT and said in note.text)
+    ):
+        noise_model = NoiseModel(share, time_s, 0.0, walk=walk)
+        note = find_slow_misfit(noise_model, (error, error), 400.0, 0.03, lambda: "it is so")
+        assert (note is not None) == bool(said)
+        assert note is None or (note.weight == DOUBT and said in note.text)
 
 
 @pytest.mark.nightly
@@ -194,5 +200,6 @@ def test_a_sensor_that_is_logged_more_often_than_read_is_named() -> None:
     found = told(time_s, np.repeat(values[::times], times), **ZENER)
     assert found.status == DOUBTFUL
     assert "repeat the one before" in found.data["reasons"][0]
-    (count,) = re.findall(r"as (\d+) independent ones", str(found))
+    ((all_of_them, count),) = re.findall(r"the (\d+) residuals as (\d+) independent", str(found))
+    assert 580 < int(all_of_them) <= 600
     assert float(count) == pytest.approx(600 / times, rel=0.3)

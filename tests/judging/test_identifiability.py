@@ -48,27 +48,24 @@ def test_covariances_of_few_readings() -> None:
     assert grows[0, 0] == pytest.approx(3700 / 500**2)
 
 
-@pytest.mark.parametrize(
-    ("form", "value", "low", "high"),
-    [
+def test_quantities_and_their_gradients() -> None:
+    """Ranges are of parameters from 1/e to e^2 times the values."""
+    for form, value, low, high in (
         # From a sum one spring can be absent; in a row the others can be rigid.
         ("sum", 5.0, np.log(5.0) - 1, np.log(3.0) + 2),
         ("series", 1.2, np.log(2.0) - 1, np.log(1.2) + 2),
         ("time", 40 / 3, np.log(40 / 3) - 3, np.log(40 / 3) + 3),
         ("parameter", 200.0, np.log(200.0) - 1, np.log(200.0) + 2),
-    ],
-)
-def test_quantities_and_their_gradients(form: str, value: float, low: float, high: float) -> None:
-    """Ranges are of parameters from 1/e to e^2 times the values."""
-    model = Sample("burgers").model
-    x = np.log([3.0, 200.0, 2.0, 40.0])
-    springs, times = find_combinations(model, [0, 2]), find_combinations(model, [0, 3])
-    every = {"sum": springs[0], "series": springs[1], "time": times[0]}
-    quantity = (every | {"parameter": parameters_and_sum(model)[1]})[form]
-    assert math.exp(quantity.log(x)) == pytest.approx(value, rel=1e-12)
-    slopes = [(quantity.log(x + h) - quantity.log(x - h)) / 2e-6 for h in 1e-6 * np.eye(4)]
-    assert quantity.gradient(x) == pytest.approx(np.array(slopes), abs=1e-8)
-    assert quantity.range(x - 1, x + 2) == pytest.approx((low, high))
+    ):
+        model = Sample("burgers").model
+        x = np.log([3.0, 200.0, 2.0, 40.0])
+        springs, times = find_combinations(model, [0, 2]), find_combinations(model, [0, 3])
+        every = {"sum": springs[0], "series": springs[1], "time": times[0]}
+        quantity = (every | {"parameter": parameters_and_sum(model)[1]})[form]
+        assert math.exp(quantity.log(x)) == pytest.approx(value, rel=1e-12)
+        slopes = [(quantity.log(x + h) - quantity.log(x - h)) / 2e-6 for h in 1e-6 * np.eye(4)]
+        assert quantity.gradient(x) == pytest.approx(np.array(slopes), abs=1e-8)
+        assert quantity.range(x - 1, x + 2) == pytest.approx((low, high))
 
 
 @functools.cache
@@ -100,21 +97,18 @@ def test_verdicts_on_the_papers_cases(case: str, verdicts: list[str]) -> None:
     assert (total.low or np.inf) * 0.98 < truth < (total.high or 0.0) * 1.02
 
 
-@pytest.mark.parametrize(
-    ("candidate", "found"),
-    [
+def test_elements_of_spring_and_damper_have_a_time() -> None:
+    for candidate, found in (
         ("generalized_maxwell_2", {"tau_1": "c_1/k_1", "tau_2": "c_2/k_2"}),
         ("burgers", {"tau_s": "c_s/k_s", "tau_v": "c_v/k_v"}),
         ("kelvin_voigt", {"tau_p": "c_p/k_p"}),
         ("springpot_beside_damper", {}),
-    ],
-)
-def test_elements_of_spring_and_damper_have_a_time(candidate: str, found: dict[str, str]) -> None:
-    model = CANDIDATES[candidate].model
-    times, logs = characteristic_times(model), np.log(model.example)
-    own = {each.label: "/".join(model.names[it] for it in each.members) for each in times}
-    assert own == found
-    assert all(each.log(logs) == logs[list(each.members)] @ [1, -1] for each in times)
+    ):
+        model = CANDIDATES[candidate].model
+        times, logs = characteristic_times(model), np.log(model.example)
+        own = {each.label: "/".join(model.names[it] for it in each.members) for each in times}
+        assert own == found
+        assert all(each.log(logs) == logs[list(each.members)] @ [1, -1] for each in times)
 
 
 def test_the_valley_is_as_deep_along_the_sum_as_the_profile_says() -> None:

@@ -11,7 +11,8 @@ from biogrip.fit.least_squares import FINE
 from biogrip.fit.levenberg_marquardt import Normal
 from biogrip.fit.trace_fit import TraceFit
 from biogrip.judging.constrained_fits import ConstrainedFits, QuantityConstraint
-from biogrip.judging.diagnosis import diagnose
+from biogrip.judging.diagnosis import RING, diagnose
+from biogrip.judging.doubts import DOUBT, Note
 from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.onset import _at, profile_over_onset
 from biogrip.judging.profiles import Points, Profile, _limits, compute_profiles, find_gaps
@@ -166,7 +167,10 @@ def test_a_fitted_onset_leaves_the_limits_that_every_onset_has() -> None:
     exact = simulate(experiment, {"k_p": 6.0, "c_p": 30.0}, times)
     trace = exact + 9e-6 * np.random.default_rng(1).standard_normal(len(times))
     alone = diagnosis_of(experiment.of(times, trace), experiment.model)
-    merged, _ = profile_over_onset(alone, times)
+    notes = [Note(DOUBT, "Something else."), Note(DOUBT, f"{RING}: what inertia does.")]
+    merged, ends = profile_over_onset(replace(alone, notes=notes), times)
+    # Of milliseconds after a step nothing is told where it is known to tenths of a second.
+    assert (merged.notes, ends[0] < -0.05, ends[1] > 0.05) == (notes[:1], True, True)
     # What a later onset costs is taken off the threshold, and off what a limit takes.
     later, best = _at(alone.likelihood, 0.2), alone.likelihood
     cost = best.increase(later.misfit)
@@ -259,6 +263,9 @@ def test_a_set_in_two_parts_has_a_gap_that_its_verdict_names() -> None:
     whole = Profile(values, parabolas(values), 2.0, -3.0, 3.0, np.zeros(4))
     others: tuple[dict[str, Any], ...] = ({}, {"gaps": (gap,)}, {"high": None}, {"low": None})
     said = [Finding(QUANTITIES[0], replace(whole, **other), 0.1).words() for other in others]
+    gapped = Finding(QUANTITIES[0], replace(whole, gaps=(gap,)), 0.1)
+    allowed = [gapped.allows(np.full(4, at)) for at in (-4.0, 0.0, 2.0, 4.0)]
+    assert allowed == [False, False, True, False]
     determined = "determined only to 2.6 decades: 7.4 N/m (0.05 to 20)"
     assert said == [
         determined,

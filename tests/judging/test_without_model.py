@@ -86,6 +86,8 @@ def test_a_limit_is_where_chi_squared_has_risen(seed: int) -> None:
     """
     readings = zener(TIMES) + noise(3.6, seed)
     found = by_name(tell(TIMES, readings, noise_sd=3.6))
+    tiny = by_name(tell(TIMES, 1e-9 * readings, noise_sd=3.6e-9))
+    assert {n: it.verdict for n, it in tiny.items()} == {n: it.verdict for n, it in found.items()}
     least, best = fitted(RELAXED, readings)
     left = np.exp(-RATES * 10)
     slope, omega = 10 * RATES * left, 0.1
@@ -234,6 +236,15 @@ def test_what_lags_add_at_4_s() -> None:
         "fast": pytest.approx([0.5, 0.8]),
         "lost": pytest.approx([0.5, 0.4]),
     }
+
+
+def test_other_starts_widen_limits_of_what_all_of_them_tell() -> None:
+    told, found = Told("G(1 s)", LEVEL, 1.0, "Pa", 15.0, 14.0, 16.0), tell(TIMES, zener(TIMES))
+    own, other, none = (
+        replace(found, told=each) for each in ([told], [replace(told, low=13.0, high=15.5)], [])
+    )
+    assert own.widened([other]).told == [replace(told, low=13.0, high=16.0)]
+    assert own.widened([other, none]).told == [replace(told, value=None, low=None, high=None)]
 
 
 def test_times_at_which_it_is_told() -> None:

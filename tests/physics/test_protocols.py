@@ -18,7 +18,6 @@ from biogrip.physics.models import Sample, generalized_maxwell
 from biogrip.physics.protocol import (
     SWEEP,
     Course,
-    Phase,
     evaluate,
     hold,
     join_phases,
@@ -71,31 +70,21 @@ def test_phi_functions_against_50_digits() -> None:
 EVENLY, HELD = np.arange(0, 41, 2.0), (hold(40.0, 1e-9),)
 
 
-@pytest.mark.parametrize(
-    ("name", "phases", "time_s", "offset", "by_series"),
-    [
+def test_no_response_is_needed_of_steps_that_are_sampled_evenly(gripper: Gripper) -> None:
+    """By a sample with one branch, whose readings have no offset."""
+    for name, phases, time_s, offset, by_series in (
         ("maxwell", HELD, EVENLY, False, True),
         ("maxwell", HELD, np.sqrt(EVENLY), False, False),
         ("maxwell", HELD, EVENLY, True, False),
         ("maxwell", (hold(3.0, 1e-9), hold(37.0, 2e-9)), EVENLY, False, False),
         ("maxwell", (ramp(40.0, 0.0, 4e-9),), EVENLY, False, False),
         ("burgers", HELD, EVENLY, False, False),
-    ],
-)
-def test_no_response_is_needed_of_steps_that_are_sampled_evenly(
-    gripper: Gripper,
-    name: str,
-    phases: tuple[Phase, ...],
-    time_s: Array,
-    offset: bool,
-    by_series: bool,
-) -> None:
-    """By a sample with one branch, whose readings have no offset."""
-    experiment = replace(set_up(gripper, phases, Sample(name)), offset=offset)
-    residuals = experiment.of(time_s, np.zeros_like(time_s)).residuals
-    misfit = make_misfit(residuals)
-    assert isinstance(misfit, SeriesMisfit) == by_series
-    assert by_series or misfit == residuals.misfit
+    ):
+        experiment = replace(set_up(gripper, phases, Sample(name)), offset=offset)
+        residuals = experiment.of(time_s, np.zeros_like(time_s)).residuals
+        misfit = make_misfit(residuals)
+        assert isinstance(misfit, SeriesMisfit) == by_series
+        assert by_series or misfit == residuals.misfit
 
 
 def test_rounding_does_not_lose_the_last_sample() -> None:

@@ -87,15 +87,3 @@ def test_over_the_whole_range_the_jaws_never_pull(either_gripper: Gripper, steps
             # And to rounding of arms that nothing is between.
             assert np.max(away[until]) < 1e-10 * expected.max() + 1e-14 * 1.6e-9 / 4.4e-7
         assert bool(found.parted_s) == bool(both.min() < -1e-9 * both.max())
-
-
-def test_samples_that_lack_elements(gripper: Gripper, steps: Course) -> None:
-    """No spring brings a liquid back; a spring alone is never let go."""
-    time_s = np.array([199.9, 200.1, 400.0])
-    drop = models.liquid_drop([1.0, 0.0, 10.0])
-    for network in (models.maxwell([1.0, 10.0]), models.damper([10.0]), drop):
-        found = unilateral_response(gripper, network, steps, time_s)
-        assert found.touching.tolist() == [True, False, False]
-        assert found.shortening_m[2] == pytest.approx(found.shortening_m[1], rel=1e-12)
-    spring = unilateral_response(gripper, models.kelvin_voigt([0.05, 0.0]), steps, time_s)
-    assert np.all(spring.touching)

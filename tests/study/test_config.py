@@ -137,7 +137,12 @@ def test_the_paper_s_errors_are_signed_numbers(tmp_path: Path) -> None:
 TYPED: dict[str, Any] = {
     "evaluation": {"near_noise_tolerance": "0.03"},
     "search_range": {"k": {"exponent": ["-2", "3"]}},
-    "measurement": {"rate_Hz": "1e1", "drift": "false", "noise": {"kind": "uniform"}},
+    "measurement": {
+        "rate_Hz": "1e1",
+        "drift": "false",
+        "offset": "True",
+        "noise": {"kind": "uniform"},
+    },
     "protocol": {"phases": [{"duration_s": "200", "torque_Nm": "1.6e-9"}]},
     "cases": {"liquid_drop_1": {"title": "5", "sample": {"k": "9"}}},
 }
@@ -148,7 +153,8 @@ def test_numbers_of_the_command_line_are_numbers() -> None:
     assert study.near_noise_tolerance == 0.03
     case = study.cases["liquid_drop_1"]
     assert case.experiment.ranges["k"].exponent == (-2, 3)
-    assert (case.block.measurement.rate_Hz, case.block.measurement.drift) == (10.0, False)
+    read = case.block.measurement
+    assert (read.rate_Hz, read.drift, read.offset) == (10.0, False, True)
     assert [phase.duration_s for phase in case.phases] == [200.0]
     assert (case.title, case.parameters["k"]) == ("5", 9.0)
 

@@ -31,9 +31,8 @@ def load_at(time_s: Array) -> Array:
     return np.interp(time_s - time_s[0], *CORNERS)
 
 
-@pytest.mark.parametrize(
-    ("text", "name", "expected"),
-    [
+def test_what_was_held_may_have_its_unit() -> None:
+    for text, name, expected in (
         ("20pN", "force", 20e-12),
         ("1e-3N", "force", 1e-3),
         ("3 gf", "force", 3 * 9.80665e-3),
@@ -42,12 +41,10 @@ def load_at(time_s: Array) -> Array:
         ("-5 mbar", "stress", -500.0),
         ("10 cm H2O", "stress", 980.665),
         ("1 mmHg", "stress", 133.322387415),
-    ],
-)
-def test_what_was_held_may_have_its_unit(text: str, name: str, expected: float) -> None:
-    controlled = next(each for each in CONTROLLED if each.name == name)
-    number, unit = held_unit(text, controlled)
-    assert number * controlled.units[unit] == pytest.approx(expected, rel=1e-12)
+    ):
+        controlled = next(each for each in CONTROLLED if each.name == name)
+        number, unit = held_unit(text, controlled)
+        assert number * controlled.units[unit] == pytest.approx(expected, rel=1e-12)
 
 
 def test_the_noise_of_a_share_is_that_of_the_largest_reading() -> None:
@@ -215,22 +212,17 @@ def test_a_column_of_the_load_is_the_protocol_of_all_rows(tmp_path: Path, start_
     assert found.form["others"] == np.count_nonzero(~dwell)
 
 
-@pytest.mark.parametrize(
-    ("key", "value", "said"),
-    [
+def test_a_load_or_rows_that_are_not_there_are_explained(tmp_path: Path) -> None:
+    for key, value, said in (
         ("load", "Force", "there is no column 'Force'. The file has: Time_S, Fn in mN"),
         ("load", "Segment", "column 'Segment': found no unit, neither stated (by --set measure"),
         ("load_unit", "V", "measurement.load_unit: found 'V', allowed are m, cm, mm, um, nm."),
         ("rows", {"Segment": "dwel"}, "found no row with 'dwel', allowed are approach"),
         ("rows", {"Part": 2}, "there is no column 'Part'. The file has: Time_S"),
         ("fit_start", True, "measurement.fit_start: does not go with load; allowed is one of"),
-    ],
-)
-def test_a_load_or_rows_that_are_not_there_are_explained(
-    tmp_path: Path, key: str, value: object, said: str
-) -> None:
-    asked = written(tmp_path / "t.csv")
-    settings = (*asked.settings, Setting("--set", ("measurement", key), value))
-    with pytest.raises(BiogripError) as error:
-        read_trace(Asked(asked.trace, None, settings))
-    assert said in str(error.value)
+    ):
+        asked = written(tmp_path / "t.csv")
+        settings = (*asked.settings, Setting("--set", ("measurement", key), value))
+        with pytest.raises(BiogripError) as error:
+            read_trace(Asked(asked.trace, None, settings))
+        assert said in str(error.value)

@@ -98,9 +98,8 @@ def test_the_largest_reading_and_the_smoothed_one_are_told() -> None:
     assert "allowed is at most 0.00545 rad" in said(TIMES, 1e297 * values)
 
 
-@pytest.mark.parametrize(
-    ("column", "factor", "found", "hint"),
-    [
+def test_the_unit_that_would_fit_is_named() -> None:
+    for column, factor, found, hint in (
         ("rotation_rad", 1e6, "line ", "1e-06 times (is it in urad?)."),
         ("rotation_rad", 180 / np.pi, "line ", "0.001 times (is it in mrad?) or 0.01745 times (i"),
         ("rotation_mrad", 1e-3, "line ", "1000 times (is it in rad?) or 17.45 times (is it in d"),
@@ -108,20 +107,16 @@ def test_the_largest_reading_and_the_smoothed_one_are_told() -> None:
         ("time_s", 1e3, "line 3, column 'time_s': found 1000 s", "0.001 times (is it in ms?)."),
         ("time_ms", 1e-3, "lines 2 to 402, column 'time_ms': found only 0 to 0.4 s", "1000 times"),
         ("time_min", 60.0, "line 9, column 'time_min': found 420 s", "0.01667 times (is it in s?)"),
-    ],
-)
-def test_the_unit_that_would_fit_is_named(
-    column: str, factor: float, found: str, hint: str
-) -> None:
-    values, of_time = trace(SAMPLES["liquid_drop_1"]), column.startswith("time")
-    if of_time:
-        text = said(factor * TIMES, values, Columns(column, "rotation_rad"))
-    else:
-        text = said(TIMES, factor * values, Columns("time_s", column))
-    assert text.startswith(f"trace.csv, {found}")
-    assert f"column '{column}'" in text
-    assert f"It would fit if it were {hint}" in text
-    assert ("400 s" in text) == of_time
+    ):
+        values, of_time = trace(SAMPLES["liquid_drop_1"]), column.startswith("time")
+        if of_time:
+            text = said(factor * TIMES, values, Columns(column, "rotation_rad"))
+        else:
+            text = said(TIMES, factor * values, Columns("time_s", column))
+        assert text.startswith(f"trace.csv, {found}")
+        assert f"column '{column}'" in text
+        assert f"It would fit if it were {hint}" in text
+        assert ("400 s" in text) == of_time
 
 
 def test_a_stiff_sample_passes_if_its_rotation_is_far_above_a_given_noise() -> None:

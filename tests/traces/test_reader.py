@@ -189,9 +189,8 @@ def test_a_unit_is_read_off_a_name_or_a_row_of_units_or_stated(
     assert [allowed[each] for each in found] == [size]
 
 
-@pytest.mark.parametrize(
-    ("column", "given", "below", "message"),
-    [
+def test_a_unit_is_never_guessed() -> None:
+    for column, stated, below, message in (
         ("x_y", None, "", "found no unit, neither stated (by HOW) nor"),
         ("x_uN", None, "", "found the unit 'uN' at the end of the name; allowed"),
         ("phi (mrad) left", None, "", "found no unit"),
@@ -203,12 +202,10 @@ def test_a_unit_is_read_off_a_name_or_a_row_of_units_or_stated(
         ("phi_mrad", "urad", "", "found the unit 'urad' where the name says 'mrad', allowed is"),
         ("phi", "rad", "deg", "found the unit 'rad' where the row of units says 'deg'"),
         ("phi_mrad", None, "rad", "found the unit 'mrad' where the row of units says 'rad'"),
-    ],
-)
-def test_a_unit_is_never_guessed(column: str, given: str | None, below: str, message: str) -> None:
-    with pytest.raises(BiogripError) as error:
-        unit(column, given, ROTATION.units, below)
-    assert str(error.value).startswith(f"t.csv, column '{column}': {message}")
+    ):
+        with pytest.raises(BiogripError) as error:
+            unit(column, stated, ROTATION.units, below)
+        assert str(error.value).startswith(f"t.csv, column '{column}': {message}")
 
 
 @pytest.mark.parametrize(
@@ -222,22 +219,17 @@ STRANGE = ("Strain (a.u.)", "Strain [10^-6]", "1000*strain", "Strain x1000", "St
 UNKNOWN = [("ns", TIME_UNITS), ("MS", TIME_UNITS), ("pm", DISPLACEMENT.units)]
 
 
-@pytest.mark.parametrize(
-    ("name", "given", "allowed"),
-    [
+def test_an_unknown_unit_is_refused_without_one_of_another_size() -> None:
+    for name, stated, allowed in (
         *((name, None, STRAIN.units) for name in STRANGE),
         *(("x", *each) for each in [*UNKNOWN, ("lbf", FORCE.units)]),
-    ],
-)
-def test_an_unknown_unit_is_refused_without_one_of_another_size(
-    name: str, given: str | None, allowed: Any
-) -> None:
-    with pytest.raises(BiogripError) as error:
-        unit(name, given, allowed)
-    assert f"allowed are {', '.join(allowed)}" in str(error.value)
-    assert "Did you mean" not in str(error.value)
-    if given is None:
-        assert unit(name, "1", allowed) == "1"
+    ):
+        with pytest.raises(BiogripError) as error:
+            unit(name, stated, allowed)
+        assert f"allowed are {', '.join(allowed)}" in str(error.value)
+        assert "Did you mean" not in str(error.value)
+        if stated is None:
+            assert unit(name, "1", allowed) == "1"
 
 
 def test_of_a_file_without_the_columns_the_names_above_numbers_are_said(tmp_path: Path) -> None:

@@ -169,7 +169,8 @@ def select(
     Chromosomes are (n_populations, n, n_genes), misfits (n_populations, n). NaN is ranked last. Of
     equals the one with the lowest genes is first.
     """
-    order = np.lexsort((*genome.keys(chromosomes), ranking))[:, :count]
+    keys: list[NDArray[Any]] = [*genome.keys(chromosomes), ranking]
+    order = np.lexsort(keys)[:, :count]
     return _taken(chromosomes, order), _taken(ranking, order)
 
 
