@@ -1,6 +1,8 @@
 import json
 import re
 import shlex
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -102,3 +104,12 @@ def test_examples_are_commands_that_can_be_typed(
         program, *arguments = shlex.split(line)
         assert (program, arguments[0]) == ("biogrip", command)
         _parser().parse_args(arguments)
+
+
+def test_a_command_needs_no_standard_streams(tmp_path: Path) -> None:
+    """As of a service, which closes them: no file gets what is printed."""
+    write_drop(tmp_path / "trace.csv", 0)
+    command = shlex.join([sys.executable, "-m", "biogrip", "identify", "trace.csv", "--no-compare"])
+    closed = f"{command} <&- >&- 2>&-"
+    assert subprocess.run(closed, shell=True, cwd=tmp_path, check=False).returncode == 0
+    assert json.loads((tmp_path / "trace.identified.json").read_text())["fit"] == "ok"

@@ -3,10 +3,12 @@
 import sys
 
 from biogrip.processes import end_when_stopped
+from biogrip.terminal import open_closed_streams
 
 
 def main() -> int:
     """Run the command line of this process, and return its exit status."""
+    open_closed_streams()
     end_when_stopped()
     import atexit
     import gc

@@ -20,6 +20,7 @@ _OBEYED = (
     *(range(0x2028, 0x202F), range(0x2066, 0x206A), range(0xD800, 0xE000)),
 )
 _SHOWN = {number: ascii(chr(number))[1:-1] for numbers in _OBEYED for number in numbers}
+_STREAMS = {"stdin": "r", "stdout": "w", "stderr": "w"}
 
 
 def visible(text: object) -> str:
@@ -37,6 +38,19 @@ def aligned(rows: Sequence[Sequence[str]], header: Sequence[str]) -> str:
     widths = [max(map(len, column)) for column in zip_longest(header, *rows, fillvalue="")]
     lines = [header, ["-" * width for width in widths], *rows]
     return "\n".join("  ".join(map(str.ljust, line, widths)).rstrip() for line in lines)
+
+
+def open_closed_streams() -> None:
+    """Open standard streams that are closed, so that output to them is lost.
+
+    Otherwise the next file opened would receive the output of this process or its children.
+    """
+    while (opened := os.open(os.devnull, os.O_RDWR)) < len(_STREAMS):
+        os.set_inheritable(opened, True)
+    os.close(opened)
+    for number, (name, mode) in enumerate(_STREAMS.items()):
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(number, mode, encoding="utf-8", closefd=False))
 
 
 class Progress:
