@@ -18,7 +18,7 @@ from biogrip.errors import BiogripError
 from biogrip.files import scratch_path, write_text
 from biogrip.identify.prepare import prepare
 from biogrip.study.case_blocks import OVERRIDABLE
-from biogrip.study.source import default_config, overlaid, shipped
+from biogrip.study.source import default_config, overlaid, snakefile
 from biogrip.study.study import read_configs
 from biogrip.terminal import visible
 from biogrip.traces.columns import trace_file_problem
@@ -49,7 +49,7 @@ def write_study(
     scratch.mkdir()
     write_text(scratch / "study.yaml", yaml.safe_dump(study, sort_keys=False, allow_unicode=True))
     scratch.rename(folder)
-    here, rules = Path("Snakefile"), shipped("Snakefile")
+    here, rules = Path("Snakefile"), snakefile()
     named = [] if here.is_file() and rules.samefile(here) else ["-s", str(rules)]
     given = ["--directory", str(folder), "--configfile", str(folder / "study.yaml")]
     print(f"Written to {visible(folder / 'study.yaml')}. Run the study, and open its page:\n")

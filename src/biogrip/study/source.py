@@ -48,6 +48,11 @@ def shipped(name: str) -> Path:
     return _TOP / name
 
 
+def snakefile() -> Path:
+    """Return the workflow that comes with the code, for a workflow of one's own."""
+    return shipped("Snakefile")
+
+
 def values_in(block: Any, above: KeyPath = ()) -> Iterator[tuple[KeyPath, Any]]:
     """Yield all values of a block and of the blocks and lists below, with their paths."""
     if isinstance(block, list):
