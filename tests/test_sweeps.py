@@ -15,8 +15,8 @@ from biogrip.cli import _parser
 from biogrip.command.settings import Asked, read_trace
 from biogrip.command.words import set_up_in_words
 from biogrip.errors import BiogripError
-from biogrip.fit.any_sample import swept_deviations
-from biogrip.judging.whiteness import find_inertia
+from biogrip.fit.any_sample import _swept_shares, swept_deviations
+from biogrip.judging.whiteness import about_moduli, find_inertia
 from biogrip.library import INSTRUMENTS, Sample, hold, set_up, simulate
 from biogrip.physics.models import MODELS
 from biogrip.physics.protocol import joined
@@ -219,6 +219,9 @@ def test_deviations_are_a_share_of_the_moduli_of_the_nearest_sample() -> None:
     sd, shares = swept_deviations(places, readings, 0.02, 0.0)
     np.testing.assert_allclose(sd, 0.02 * exact, rtol=0.04)
     assert shares == {"storage": 0.02, "loss": 0.02}
+    # Of four readings, of which three are taken, one tells.
+    few = np.array([1.1, 0.9, 1.1, 0.9]), np.ones(4), np.arange(4) < 2
+    assert _swept_shares(*few, 3) == pytest.approx([0.2, 0.2])
     assert "as they scatter" not in str(swept(solid(), noise_share=0.02))
 
 
@@ -274,4 +277,7 @@ def test_inertia_is_said_as_a_share_of_the_highest_storage_modulus() -> None:
     places = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])
     residual = np.array([0.1, 0.0, 0.0, 2.0, 8.0, 18.0])
     read = seen(time_s=places, readings=[357.2], condensed=seen(cleared=lambda rows: rows))
-    assert ", 5 % at" in find_inertia(seen(trace=read), residual, np.zeros((0, 6)))
+    given = seen(trace=read, freedom=9.0), residual, np.zeros((0, 6))
+    assert ", 5 % at" in find_inertia(*given)
+    (said,) = about_moduli(*given, np.ones(6))
+    assert said.startswith("The fit leaves what is of inertia of the instrument or the sample, as")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.judging.diagnosis import Diagnosis, _pulling, _ringing, diagnose
+from biogrip.judging.diagnosis import Diagnosis, _pulling, _ringing, _with_valley, diagnose
 from biogrip.judging.likelihood import Likelihood, bound, check_rows, covariance, make_likelihood
 from biogrip.judging.profiles import _increases, compute_valley
 from biogrip.judging.quantities import characteristic_times, find_combinations, parameters_and_sum
@@ -133,6 +133,12 @@ def test_the_valley_is_as_deep_along_the_sum_as_the_profile_says() -> None:
     for times, expected in ((1.0, None), (1.01, pytest.approx(likelihood.best, abs=1e-3))):
         above = replace(likelihood, misfit=times * likelihood.misfit)
         assert _increases(above, [2, 3], c * [[0.9, 1.0, 1.1]], c_p * np.ones(3))[1] == expected
+    missed = _with_valley(replace(diagnosis, likelihood=above, lowest=None), MODEL).lowest
+    assert missed is not None
+    assert np.exp(missed[2:]).sum() == pytest.approx(best, rel=0.02)
+    # A profile's counts first.
+    found = replace(diagnosis, likelihood=above, lowest=likelihood.best)
+    assert _with_valley(found, MODEL).lowest is likelihood.best
 
 
 @pytest.mark.parametrize("name", ["springpots_in_series", "springpots_in_parallel"])
@@ -213,6 +219,8 @@ def test_parameters_that_stand_for_one_another_have_no_bounds() -> None:
     shares = np.array([0.0, 0.99, 0.01])
     found = np.diag(covariance(rows, 1.0, np.vstack([np.eye(3), shares])))
     assert found == pytest.approx([1 / 300**2, np.inf, np.inf, 1 / 5000**2])
+    inverse = np.diag(covariance(rows, 1.0, -np.eye(3)))
+    assert inverse == pytest.approx([1 / 300**2, np.inf, np.inf])
 
 
 def test_what_a_trace_without_noise_tells_may_outweigh_every_prior() -> None:

@@ -15,7 +15,14 @@ from biogrip.judging.diagnosis import RING, diagnose
 from biogrip.judging.doubts import DOUBT, Note
 from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.onset import _at, profile_over_onset
-from biogrip.judging.profiles import Points, Profile, _limits, compute_profiles, find_gaps
+from biogrip.judging.profiles import (
+    Points,
+    Profile,
+    _limits,
+    compute_profiles,
+    find_gaps,
+    keep_lower,
+)
 from biogrip.judging.quantities import Quantity, find_combinations, parameters_and_sum
 from biogrip.judging.verdicts import DETERMINED, Finding
 from biogrip.library import set_up, simulate
@@ -345,3 +352,11 @@ def test_limits_are_lmfits(
         assert np.isnan(found.loc["k_s", ["low", "high"]].astype(float)).all()
     for name, ends in zip(list(SOLID)[-len(limits) :], limits, strict=True):
         assert found.loc[name, ["low", "high"]].tolist() == pytest.approx(ends, rel=3e-5)
+
+
+def test_a_fit_is_news_if_it_is_lower_by_a_thousandth() -> None:
+    """Relative to 1 + the increase of chi-squared, here 10.98 and 10.995."""
+    for lower, expected in ((9.98, True), (9.995, False)):
+        increases, x = np.array([3.0, 10.0]), np.zeros((2, 1))
+        news = keep_lower(increases, x, np.array([1]), np.array([lower]), np.ones((1, 1)))
+        assert (news.tolist(), increases[1], x[1, 0]) == ([False, expected], lower, 1.0)

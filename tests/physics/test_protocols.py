@@ -141,6 +141,8 @@ def test_coinciding_roots_are_moved_apart_about_their_mean() -> None:
     assert abs(found[0] - found[1]) == pytest.approx(3 * SMALLEST_GAP, rel=1e-6)
     assert found[:2].mean() == pytest.approx(-3.0, rel=1e-12)
     assert found[2] == -1.0
+    near = separate(np.array([[-3.0, 1.0 - 1e-6, -1.0]], dtype=complex), origin) - origin
+    assert (near[0, 1] - near[0, 0]).real == pytest.approx(3 * SMALLEST_GAP, rel=1e-6)
 
 
 def test_a_place_in_a_sweep_names_modulus_and_frequency() -> None:
