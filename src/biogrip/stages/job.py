@@ -44,8 +44,27 @@ class _Named:
         return super().__getattribute__(name)
 
 
+class _NamedOfStudy(_Named, StudyConfig):
+    pass
+
+
+class _NamedOfCase(_Named, CaseBlock):
+    pass
+
+
+class _NamedOfMeasurement(_Named, MeasurementBlock):
+    pass
+
+
+class _NamedOfIdentifiability(_Named, Identifiability):
+    pass
+
+
 # Blocks of which a rule may name single keys.
-_SPLIT: dict[str, type] = {"measurement": MeasurementBlock, "identifiability": Identifiability}
+_SPLIT: dict[str, tuple[type, type[_Named]]] = {
+    "measurement": (MeasurementBlock, _NamedOfMeasurement),
+    "identifiability": (Identifiability, _NamedOfIdentifiability),
+}
 
 
 def settings(study: Study, keys: Iterable[str], case: str = "") -> dict[str, Any]:
@@ -76,7 +95,8 @@ def keys_of_cases(study: Study, *keys: str) -> list[str]:
 
 def case_of(name: str, given: Mapping[str, Any]) -> Case:
     """Return a case of which some keys are given, by `settings`."""
-    return Case(name, _named(CaseBlock, given), Study(_named(StudyConfig, given)))
+    study = Study(_NamedOfStudy(_typed(StudyConfig, given)))
+    return Case(name, _NamedOfCase(_typed(CaseBlock, given)), study)
 
 
 def study_of(given: Mapping[str, Any]) -> Study:
@@ -86,25 +106,27 @@ def study_of(given: Mapping[str, Any]) -> Study:
         if key.startswith("cases."):
             _, name, inner = key.split(".", 2)
             cases.setdefault(name, {})[inner] = value
-    blocks = {name: _named(CaseBlock, own) for name, own in cases.items()}
-    return Study(_named(StudyConfig, given, cases=blocks))
+    keys = _typed(StudyConfig, given)
+    keys["cases"] = {name: _NamedOfCase(_typed(CaseBlock, own)) for name, own in cases.items()}
+    return Study(_NamedOfStudy(keys))
 
 
-def _named(kind: Any, given: Mapping[str, Any], **more: Any) -> Any:
-    """Return a block with those of the keys given that it has; None stands for their default."""
+def _typed(kind: Any, given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return those of the keys given that a block has; None stands for their default."""
     hints = get_type_hints(kind, include_extras=True)
     keys: dict[str, Any] = {}
     for field in fields(kind):
         above = f"{field.name}."
         inner = {key.removeprefix(above): given[key] for key in given if key.startswith(above)}
         if inner and field.name in _SPLIT:
-            keys[field.name] = _named(_SPLIT[field.name], inner)
+            block, named = _SPLIT[field.name]
+            keys[field.name] = named(_typed(block, inner))
         elif given.get(field.name) is not None:
             keys[field.name] = built(hints[field.name], given[field.name])
         elif field.name in given:
             made = field.default_factory
             keys[field.name] = field.default if made is MISSING else made()
-    return type(kind.__name__, (_Named, kind), {})(keys | more)
+    return keys
 
 
 def batch_names(seeds: int, size: int) -> list[str]:
