@@ -82,8 +82,6 @@ _BY_SPHERE = {"force": "stress", "displacement": "strain"}
 # Of each group of keys of the measurement, the one that is set last replaces the others.
 _ONE_OF = {"start_s", "fit_start"}, {*READINGS}
 _MOST_SHOWN = 10
-# Similarity of a name with two letters exchanged, as hodl and hold.
-_MISSPELT = 0.75
 _SEPARATORS = ",;\t"
 # Blocks whose numbers are an instrument's.
 _INSTRUMENT = ("gripper", "actuator")
@@ -422,7 +420,7 @@ def _meant(name: str, cells: Sequence[str]) -> str | None:
         for cell in cells:
             number_and_unit(cell)
     except ValueError:
-        return next(iter(get_close_matches(plain, _OF_WORDS, n=1, cutoff=_MISSPELT)), None)
+        return next((word for word in _OF_WORDS if _misspelt(plain, word)), None)
     blocks = read_configs([default_config()])
     keys = [path for path in keys_in(blocks) if path[0] in _INSTRUMENT]
     known = {str(path[-1]): dotted(path) for path in keys} | dict.fromkeys(_HELD, "hold")
@@ -435,8 +433,14 @@ def _meant(name: str, cells: Sequence[str]) -> str | None:
     if plain in by_plain or by_plain.get(bare) in _OF_NUMBERS:
         return by_plain.get(plain, by_plain.get(bare))
     near = get_close_matches(plain, [key for key in by_plain if "_" in key], n=1, cutoff=0.9)
-    near += get_close_matches(plain, _OF_NUMBERS, n=1, cutoff=_MISSPELT)
+    near += [key for key in _OF_NUMBERS if _misspelt(plain, key)]
     return by_plain[near[0]] if near else None
+
+
+def _misspelt(name: str, option: str) -> bool:
+    """Return True if a name has an option's letters in another order, or nearly in theirs."""
+    close = len(name) > 3 and get_close_matches(name, [option], cutoff=0.8)
+    return bool(close) or sorted(name) == sorted(option)
 
 
 def read_table(
