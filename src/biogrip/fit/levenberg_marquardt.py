@@ -172,7 +172,7 @@ def _advance(
     above = np.where(basic, 0.0, np.minimum(state.high - x, _LONGEST_STEP))
     damping = state.damping[:, None]
     if even:
-        damping = damping / _size(reduced)
+        damping = damping / _size(reduced.information)
     step = bounded_step(reduced, damping, below, above)
     # Valleys are straight in the logarithms or, where a sum is determined, in the parameters.
     straight = np.where(state.growth[:, None] > 2, np.log1p(np.maximum(step, -0.9)), step)
@@ -199,18 +199,17 @@ def _advance(
 def _on_grid(x: Array, state: _State) -> Array:
     """Round points to the grid of each problem, except parameters at a bound."""
     # A power of two, so that points of a coarser grid are points of a finer one.
-    spacing = np.ldexp(1.0, np.frexp(_SPACING / np.sqrt(_size(state.normal)))[1])
+    spacing = np.ldexp(1.0, np.frexp(_SPACING / np.sqrt(_size(state.normal.information)))[1])
     spacing = np.minimum(spacing, _WIDEST)
     inside = (x > state.low) & (x < state.high)
     rounded = np.where(inside, np.rint(x / spacing) * spacing, x)
     return np.minimum(np.maximum(rounded, state.low), state.high)
 
 
-def _size(normal: Normal) -> Array:
-    """Return the diagonal of the information, (n, n_parameters), never zero."""
-    diagonal = np.arange(normal.information.shape[1])
-    size: Array = np.abs(normal.information[:, diagonal, diagonal]) + _SMALLEST
-    return size
+def _size(information: Array) -> Array:
+    """Return the diagonals of matrices, (n, n_parameters), never zero."""
+    # A parameter without any effect must not divide by zero.
+    return np.abs(np.diagonal(information, axis1=1, axis2=2)) + _SMALLEST
 
 
 def bounded_step(normal: Normal, damping: Array, below: Array, above: Array) -> Array:
@@ -240,9 +239,8 @@ def bounded_step(normal: Normal, damping: Array, below: Array, above: Array) -> 
 def _free_step(gradient: Array, information: Array, damping: Array, fixed: BoolArray) -> Array:
     """Compute the damped steps of parameters that are not fixed."""
     diagonal = np.arange(gradient.shape[1])
-    # Marquardt's scaling; a parameter without any effect must not divide by zero.
-    size = np.abs(information[:, diagonal, diagonal]) + _SMALLEST
-    scale = np.where(fixed, 0.0, 1 / np.sqrt(size))
+    # Marquardt's scaling.
+    scale = np.where(fixed, 0.0, 1 / np.sqrt(_size(information)))
     matrix = information * (scale[:, :, None] * scale[:, None, :])
     matrix[:, diagonal, diagonal] = np.where(fixed, 1.0, 1.0 + damping)
     return -scale * _solved(matrix, scale * gradient)

@@ -148,7 +148,9 @@ def _tried(own: Sequence[_Own], names: Sequence[str]) -> list[FittedModels]:
         for name in names
     }
     near = {chosen: np.array([diagnosis.likelihood.best for _, _, diagnosis in own])}
-    found = fit_models(problems, first.least_squares, streams, near=near, worth=_worth(own))
+    growths = [_growth(diagnosis) for _, _, diagnosis in own]
+    worth = _worth(own, growths)
+    found = fit_models(problems, first.least_squares, streams, near=near, worth=worth)
     every = []
     for place, ((recording, experiment), fit, diagnosis) in enumerate(own):
         answers = {name: found[name][place] for name in names if place in found[name]}
@@ -158,7 +160,7 @@ def _tried(own: Sequence[_Own], names: Sequence[str]) -> list[FittedModels]:
                 name: _at_own_onset(recording, experiment, name, posed[name], answer)
                 for name, answer in answers.items()
             }
-        misfits = _misfits(diagnosis, posed, answers)
+        misfits = _misfits(growths[place], posed, answers)
         tried = ranked([*answers], misfits, fit.problem.residuals.samples)
         best = preferred(tried, chosen) or chosen
         # What a fit leaves that is not rejected has been looked at.
@@ -169,7 +171,7 @@ def _tried(own: Sequence[_Own], names: Sequence[str]) -> list[FittedModels]:
     return every
 
 
-def _worth(own: Sequence[_Own]) -> Worth:
+def _worth(own: Sequence[_Own], growths: Sequence[Array | None]) -> Worth:
     """Return what tells if a model of so many parameters could have a BIC that is clearly lowest.
 
     No linear sample fits better than the best of any, see `fit_any_sample`. That is not asked where
@@ -178,9 +180,9 @@ def _worth(own: Sequence[_Own]) -> Worth:
     """
     least = [
         None
-        if experiment.fit_start or not experiment.usual_models or _growth(diagnosis) is not None
+        if experiment.fit_start or not experiment.usual_models or growth is not None
         else fit_any_sample(fit.problem.residuals).misfit
-        for (_, experiment), fit, diagnosis in own
+        for ((_, experiment), fit, _), growth in zip(own, growths, strict=True)
     ]
 
     def worth(name: str, trace: int, found: Fits) -> bool:
@@ -224,11 +226,11 @@ def _growth(diagnosis: Diagnosis) -> Array | None:
 
 
 def _misfits(
-    diagnosis: Diagnosis, problems: Mapping[str, TraceProblem], answers: Mapping[str, Fit]
+    growth: Array | None, problems: Mapping[str, TraceProblem], answers: Mapping[str, Fit]
 ) -> list[float]:
     """Return misfits of models; in noise that clearly grows of weighted fits, to first order."""
     misfits = [answer.misfit for answer in answers.values()]
-    if (growth := _growth(diagnosis)) is None:
+    if growth is None:
         return misfits
     for place, (name, problem) in enumerate(problems.items()):
         left, slopes = problem.residuals(within_range(answers[name].parameters, problem))

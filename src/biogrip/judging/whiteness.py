@@ -276,8 +276,10 @@ class Steps:
     """What each shows in residuals, (n_steps, n_samples)."""
     basis: Array
     """What the fit absorbs, (n_directions, n_samples)."""
+    taken: Array
+    """Parts of each along these directions, (n_steps, n_directions)."""
     norms: Array
-    """Norms of what it leaves of each, (n_steps,)."""
+    """Norms of what is left of each, (n_steps,)."""
 
     @property
     def freedom(self) -> int:
@@ -303,9 +305,8 @@ class Steps:
     @cached_property
     def _change(self) -> Array:
         """One minus the correlation of each with the next, (n_steps - 1,)."""
-        absorbed_of = self.whole @ self.basis.T
         products = np.einsum("ij,ij->i", self.whole[:-1], self.whole[1:])
-        products -= np.einsum("ij,ij->i", absorbed_of[:-1], absorbed_of[1:])
+        products -= np.einsum("ij,ij->i", self.taken[:-1], self.taken[1:])
         return np.clip(1 - products / (self.norms[:-1] * self.norms[1:]), 0.0, 1.0)
 
     def critical(self, level: float) -> float:
@@ -350,15 +351,15 @@ def steps_of(basis: Array, cleared: Callable[[Array], Array]) -> Steps:
     count = min(samples - 1, max(_AT_ONCE // samples, 1))
     before = np.unique(np.linspace(1, samples - 1, count).astype(np.int64))
     whole = cleared((np.arange(samples) >= before[:, None]).astype(float))
-    of_whole = np.einsum("ij,ij->i", whole, whole)
-    square = of_whole - np.sum((whole @ basis.T) ** 2, axis=1)
+    of_whole, taken = np.einsum("ij,ij->i", whole, whole), whole @ basis.T
+    square = of_whole - np.sum(taken**2, axis=1)
     # The step back is the same step if a constant is absorbed.
     (constant,) = cleared(np.ones((1, samples)))
     back = of_whole - 2 * (whole @ constant) + constant @ constant
     told = square > levels.TOLD * np.minimum(of_whole, back)
     if not np.all(told):
-        before, whole, square = before[told], whole[told], square[told]
-    return Steps(before, whole, basis, np.sqrt(square))
+        before, whole, taken, square = (of[told] for of in (before, whole, taken, square))
+    return Steps(before, whole, basis, taken, np.sqrt(square))
 
 
 def find_step(residual: Array, basis: Array, cleared: Callable[[Array], Array]) -> Step | None:
