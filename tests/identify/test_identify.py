@@ -13,7 +13,7 @@ import yaml
 from biogrip.arrays import Array
 from biogrip.identify.identify import identify
 from biogrip.library import INSTRUMENTS, BiogripError, Sample, hold, set_up
-from biogrip.stages.identification import judge
+from biogrip.stages.judgement import judge
 from biogrip.stages.targets import record
 from biogrip.study.source import overlaid
 from biogrip.traces.columns import Columns

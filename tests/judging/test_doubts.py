@@ -46,7 +46,7 @@ def test_what_is_not_white_is_said(parts: dict[str, Any], place: int | None, sai
     trace = add_noise(response, noise, np.random.default_rng(0), times)
     if place is not None:
         trace[place] += response.max()
-    notes = examine_residuals(likelihood_of(posed_for(MODEL, times, trace))).notes
+    notes = examine_residuals(likelihood_of(posed_for(MODEL, times, trace))).find_notes()
     doubts = " ".join(note.text for note in notes if note.weight == DOUBT)
     assert said in doubts
     assert bool(doubts) == bool(said)
@@ -60,7 +60,7 @@ def test_what_a_misfit_has_in_a_row_is_no_outlier(neighbours: int, named: bool) 
     trace = response + noise * np.random.default_rng(0).standard_normal(len(times))
     trace += 2 * noise * np.sin(2 * np.pi * times / 100)
     trace[100 : 100 + neighbours] += 20 * noise
-    notes = examine_residuals(likelihood_of(posed_for(MODEL, times, trace))).notes
+    notes = examine_residuals(likelihood_of(posed_for(MODEL, times, trace))).find_notes()
     assert "is not noise" in notes[0].text
     assert any(", at 100 s" in note.text for note in notes) == named
 
@@ -73,7 +73,7 @@ def test_a_given_noise_is_held_against_what_parameters_leave(beyond: float, said
     fit = likelihood_of(problem)
     noise_sd = fit.misfit * np.sqrt(len(times) / (beyond * chi2.isf(0.003, 7)))
     held = make_likelihood(problem, fit.best, fit.misfit, confidence=0.95, noise_sd=noise_sd)
-    notes = examine_residuals(held).notes
+    notes = examine_residuals(held).find_notes()
     assert any("the noise that was given" in note.text for note in notes) == said
 
 
@@ -82,7 +82,7 @@ def test_where_nothing_is_left_no_noise_is_doubted() -> None:
     posed = posed_for(MODEL, times, rotation(MODEL, [1.0, 1.0, 10.0, 0.1], times, inertia=False))
     fit = likelihood_of(posed)
     held = make_likelihood(posed, fit.best, fit.misfit, confidence=0.95, noise_sd=1e-6)
-    assert examine_residuals(held).notes == []
+    assert examine_residuals(held).find_notes() == []
 
 
 TIMES = np.linspace(0.25, 100, 400)

@@ -1,4 +1,6 @@
 import json
+import subprocess
+import sys
 from itertools import product
 from pathlib import Path
 from types import SimpleNamespace
@@ -85,3 +87,22 @@ def test_every_seed_is_in_one_batch_and_full_ones_stay() -> None:
         plan = job.batch_names(seeds, size)
         assert [seed for batch in plan for seed in seeds_of(batch)] == list(range(seeds))
         assert set(plan[: seeds // size]) <= set(job.batch_names(seeds + 1, size))
+
+
+@pytest.mark.parametrize(
+    ("module", "unused"),
+    [
+        ("stages.targets", {"scipy", "pandas", "matplotlib", "biogrip.judging"}),
+        ("stages.identification", {"scipy", "pandas", "matplotlib", "biogrip.judging"}),
+        ("stages.judgement", {"scipy.optimize", "pandas", "matplotlib", "biogrip.tables"}),
+        ("tables.cases", {"scipy", "matplotlib", "biogrip.judging.diagnosis"}),
+        ("tables.study", {"scipy.stats", "matplotlib", "biogrip.judging.diagnosis"}),
+        ("figures.course", {"scipy.stats", "biogrip.command"}),
+        ("page.page", {"scipy.stats", "biogrip.command"}),
+    ],
+)
+def test_a_job_loads_nothing_large_that_it_does_not_use(module: str, unused: set[str]) -> None:
+    """Loading pandas, `scipy.special` or `scipy.stats` takes longer than many a job."""
+    code = f"import sys, biogrip.{module}; print(*sys.modules)"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert not unused & set(run.stdout.split())

@@ -8,7 +8,7 @@ from scipy.stats import binomtest
 from biogrip.errors import BiogripError
 from biogrip.records.identifications import INTERVALS
 from biogrip.records.rows import read_rows, write_object
-from biogrip.stages import intervals as stage
+from biogrip.stages import judgement as stage
 from biogrip.stages import targets
 from biogrip.tables.layout import Column, ShownTable, compare, convert, write
 from biogrip.tables.study import coverage, verdict_counts

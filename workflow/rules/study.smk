@@ -119,7 +119,7 @@ rule judgement:
             *("study_seed", "actuator", *FIT, *SAMPLING, NOISE),
             *("identifiability.confidence", "least_squares"),
         ),
-        stages=["identification.judge", "identification.expect"],
+        stages=["judgement.judge", "judgement.expect"],
     message:
         "Computing confidence limits for the first trace of {wildcards.case}"
     script:
@@ -134,7 +134,7 @@ use rule judgement as recorded_judgement with:
         case=names(STUDY.recorded),
     params:
         **settings_of("measurement.start_s", "model_selection"),
-        stages=["identification.judge"],
+        stages=["judgement.judge"],
 
 
 rule intervals:
@@ -157,7 +157,7 @@ rule intervals:
             *("study_seed", "actuator", *FIT, *SAMPLING, NOISE, "least_squares"),
             *("identifiability.confidence", "identifiability.verdicts_every"),
         ),
-        stages=["intervals.estimate"],
+        stages=["judgement.estimate"],
     message:
         "Estimating intervals of {wildcards.case}, {wildcards.batch}"
     script:

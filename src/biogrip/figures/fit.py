@@ -22,7 +22,8 @@ from biogrip.physics.unilateral import UnilateralResponse, unilateral_response
 from biogrip.records.identifications import ALL, basins, read_identifications, read_verdicts
 from biogrip.records.rows import seeds_of
 from biogrip.records.traces import Measurements, read_measurements, read_target
-from biogrip.stages.identification import TRACE, experiment_for
+from biogrip.stages.identification import experiment_for
+from biogrip.stages.judgement import TRACE
 from biogrip.study.study import Case
 
 SHOWN_SEEDS = 100

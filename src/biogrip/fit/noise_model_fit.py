@@ -22,7 +22,6 @@ References
 """
 
 import numpy as np
-from scipy.special import betainc
 
 from biogrip.arrays import Array, BoolArray
 from biogrip.physics.noise import ROOT_12, NoiseModel, Whitening
@@ -75,13 +74,13 @@ def compute_growth(residual: Array, readings: Array, rounding: float = 0.0) -> A
     below 1.5 steps of rounded readings are not told apart: how readings on a plateau scatter
     depends on where it lies between two steps.
     """
-    from scipy.optimize import minimize_scalar
-
     apart = np.maximum(measure_distances(residual), 1.5 * rounding)
     size = np.abs(readings)
     constant = np.ptp(apart) == 0 or np.ptp(size) == 0
     if constant or significance_of_growth(apart, size) >= _FALSE_ALARM:
         return np.ones(len(residual))
+    from scipy.optimize import minimize_scalar
+
     found = minimize_scalar(
         lambda odds: _deviance(apart, _growth(odds, size)), bounds=(_GROWTH_LEAST, _GROWTH_MOST)
     )
@@ -99,6 +98,8 @@ def significance_of_growth(apart: Array, size: Array) -> float:
 
     As `scipy.stats.spearmanr`, but to import that takes a tenth of the time of a first trace.
     """
+    from scipy.special import betainc
+
     correlation = np.corrcoef(_ranks(apart), _ranks(size))[0, 1]
     # Student's t of the correlation, as an incomplete beta function.
     tail = betainc(len(size) / 2 - 1, 0.5, max(0.0, 1 - correlation**2)) / 2

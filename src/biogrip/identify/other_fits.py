@@ -208,7 +208,7 @@ def _leaves_noise(experiment: Experiment, problem: TraceProblem, answer: Fit) ->
         confidence=experiment.confidence,
         noise_sd=experiment.noise_sd,
     )
-    return compute_status(examine_residuals(likelihood).notes) != REJECTED
+    return compute_status(examine_residuals(likelihood).find_notes()) != REJECTED
 
 
 def _growth(diagnosis: Diagnosis) -> Array | None:

@@ -31,6 +31,7 @@ from biogrip.judging.doubts import (
     REJECTED,
     REJECTION,
     Note,
+    Remainder,
     compute_status,
     examine_residuals,
 )
@@ -162,7 +163,7 @@ def diagnose_all(
         return [_with_valley(each, model) for each in found] if valley else found
 
     judged = settled(problems, found, profile, confidence=confidence, noise_sd=noise_sd)
-    return [_with_notes(each, model) for each in judged]
+    return [_with_notes(each, remainder.find_notes(), model) for each, remainder in judged]
 
 
 def settled(
@@ -172,7 +173,7 @@ def settled(
     *,
     confidence: float,
     noise_sd: Sequence[float | None],
-) -> list[Diagnosis]:
+) -> list[tuple[Diagnosis, Remainder]]:
     """Profile traces until no profile comes below a best fit.
 
     1. What each best fit leaves is examined: limits may have to allow for a misfit.
@@ -180,9 +181,9 @@ def settled(
     3. Where one of them comes below the best fit, the trace is fitted from its lowest point, and
        1 to 3 are repeated for this trace.
 
-    Returns diagnoses with the notes of 1. See `diagnose_all` for the parameters.
+    Returns diagnoses, without notes, and what 1 found. See `diagnose_all` for the parameters.
     """
-    best, done = list(found), dict[int, Diagnosis]()
+    best, done = list(found), dict[int, tuple[Diagnosis, Remainder]]()
     while left := [trace for trace in range(len(problems)) if trace not in done]:
         likelihoods, remainders = [], []
         for trace in left:
@@ -202,8 +203,7 @@ def settled(
         for trace, judged, remainder in zip(left, profile(likelihoods), remainders, strict=True):
             lower = _lower_fit(judged, best[trace])
             if lower is None:
-                converged, notes = best[trace].converged, remainder.notes
-                done[trace] = replace(judged, converged=converged, notes=notes)
+                done[trace] = replace(judged, converged=best[trace].converged), remainder
             else:
                 best[trace] = lower
     return [done[trace] for trace in range(len(problems))]
@@ -240,8 +240,8 @@ def with_times(diagnoses: Sequence[Diagnosis], model: SampleModel) -> list[Diagn
     return [replace(own, findings=[*own.findings, *found]) for own, found in pairs]
 
 
-def _with_notes(judged: Diagnosis, model: SampleModel) -> Diagnosis:
-    """Return a diagnosis with the force of the jaws and with all notes."""
+def _with_notes(judged: Diagnosis, of_rest: list[Note], model: SampleModel) -> Diagnosis:
+    """Return a diagnosis with the force of the jaws, and all notes: those on the rest, too."""
     likelihood, findings = judged.likelihood, judged.findings
     residuals = likelihood.problem.residuals
     grip = residuals.grip(likelihood.best)
@@ -254,7 +254,7 @@ def _with_notes(judged: Diagnosis, model: SampleModel) -> Diagnosis:
         for finding in findings
         if finding.gaps
     ]
-    notes += [*_range_ends(likelihood, model), *judged.notes, *_too_slow(judged)]
+    notes += [*_range_ends(likelihood, model), *of_rest, *_too_slow(judged)]
     notes += _pulling(grip, residuals.duration_s)
     if not judged.converged:
         text = (

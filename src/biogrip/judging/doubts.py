@@ -15,7 +15,7 @@ correlated for too long may be misfit, too (`find_slow_misfit`).
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -95,17 +95,52 @@ _NAMED, _MOST_LINES = 5, 3
 class Remainder:
     """What a fit leaves."""
 
-    notes: list[Note]
-    """Doubts about it and about the noise that was given."""
+    find_notes: Callable[[], list[Note]] = list
+    """Function that tests it: doubts about it and about the noise that was given."""
     misfit: tuple[float, float] | None = None
     """If limits allow for a misfit, its worth in independent residuals and its freedom."""
 
 
+@dataclass(frozen=True)
+class _Left:
+    """Residuals, over the growth of the noise, and what tests of them have in common."""
+
+    likelihood: Likelihood
+    growth: Array
+    """How the noise grows with the reading, (n_samples,)."""
+    struck: BoolArray
+    """True for outliers, (n_samples,)."""
+    bulk: Array
+    """Residuals of the other readings."""
+    basis: Array
+    """What the fit absorbs of these, orthonormal."""
+    scale: float
+    """Standard deviation of the noise."""
+
+    @cached_property
+    def times(self) -> float:
+        """Size of what is left over that of the noise."""
+        return float(np.sqrt(np.mean(self.bulk**2))) / self.scale
+
+    @cached_property
+    def correlation(self) -> tuple[float, float]:
+        """Correlation of neighbours, and its chance."""
+        return correlated(self.bulk, self.basis)
+
+    @cached_property
+    def lines(self) -> list[str]:
+        """Sentences on lines in the spectrum; outliers have all frequencies, and sweeps none."""
+        residuals = self.likelihood.problem.residuals
+        if residuals.course.sweeps or self.struck.any():
+            return []
+        return list(_lines(self.bulk, self.basis, residuals, self.scale))
+
+
 def examine_residuals(likelihood: Likelihood) -> Remainder:
-    """Test what the best fit of a trace leaves for noise, and for misfit."""
+    """Tell what the best fit of a trace leaves: noise, or misfit."""
     residuals, misfit = likelihood.problem.residuals, likelihood.misfit
     if misfit < levels.UNRESOLVED * residuals.peak:
-        return Remainder([])
+        return Remainder()
     if residuals.samples > MANY:
         residual, slopes = residuals.left(likelihood.best), np.zeros((0, residuals.samples))
     else:
@@ -113,7 +148,7 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
     rounding = residuals.trace.rounding
     least = min(levels.NOISE_FREE * likelihood.noise_sd, levels.NOISE_FREE_OF_PEAK * residuals.peak)
     if misfit < least and estimate_noise(residual, rounding) < levels.NO_SCATTER * misfit:
-        return Remainder([])
+        return Remainder()
     growth = compute_growth(residual, residuals.response(likelihood.best), rounding)
     directions = np.vstack((slopes, residuals.trace.condensed.nuisance)) if len(slopes) else slopes
     basis = absorbed(directions / growth)
@@ -124,41 +159,45 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
     struck = outliers_of(by_leverage(standard, basis), rounding)
     if far_out(standard, struck, basis) >= levels.FALSE_ALARM:
         struck[:] = False
-    whole = not struck.any()
     # Outliers are noise of the recording: they make a fit doubtful, not wrong.
-    bulk = standard[~struck]
     basis = absorbed(basis[:, ~struck]) if struck.any() else basis
     scale = residuals.noise_scale
     if np.ptp(growth) or likelihood.freedom == np.inf:
         scale = max(scale, estimate_noise(standard, rounding))
-    times = float(np.sqrt(np.mean(bulk**2))) / scale
-    correlation, chance = correlated(bulk, basis)
-    notes = list(_about_given(likelihood, bulk))
-    found = None
-    in_time = not residuals.course.sweeps
-    lines = list(_lines(bulk, basis, residuals, scale)) if whole and in_time else []
-    if chance < levels.CERTAIN_MISFIT and times > levels.TOO_MUCH and not lines:
-        found = _misfit(residuals, (residual, slopes), (bulk, basis), times, scale)
-        notes.clear()
-        notes += found.notes
+    left = _Left(likelihood, growth, struck, standard[~struck], basis, scale)
+    certain = left.correlation[1] < levels.CERTAIN_MISFIT and left.times > levels.TOO_MUCH
+    if not certain or left.lines:
+        return Remainder(partial(_find_notes, left))
+    found, worth = _misfit(left, residual, slopes)
+    return Remainder(partial(_find_notes, left, found), worth)
+
+
+def _find_notes(left: _Left, misfit: Note | None = None) -> list[Note]:
+    """Return notes on what a fit leaves, if it is misfit with the note on that."""
+    likelihood, struck = left.likelihood, left.struck
+    residuals = likelihood.problem.residuals
+    if misfit:
+        notes = [misfit]
         # What a misfit has in a row are no outliers.
-        struck &= ~(np.convolve(struck, (1, 0, 1), "same") > 0)
-    elif compute_status(notes) == DOUBTFUL:
-        # With the wrong noise or unit, nothing else is known.
-        return Remainder(notes)
+        struck = struck & ~(np.convolve(struck, (1, 0, 1), "same") > 0)
+    else:
+        notes = list(_about_given(likelihood, left.bulk))
+        if compute_status(notes) == DOUBTFUL:
+            # With the wrong noise or unit, nothing else is known.
+            return notes
     doubts = [
-        *_about_growth(growth, scale, residuals, likelihood.best),
+        *_about_growth(left.growth, left.scale, residuals, likelihood.best),
         *_about_outliers(residuals, struck),
     ]
+    in_time = not residuals.course.sweeps
     # Outliers distort a fit, so that all that it leaves is correlated.
-    if whole:
-        suspects = partial(name_suspects, residuals, times, scale)
-        colour = list(_about_colour(bulk, basis, correlation, chance, suspects))
+    if not left.struck.any():
+        colour = list(_about_colour(left))
         if not in_time:
             # Nothing has a spectrum, or wanders, over places of two moduli.
-            colour = colour[: chance < levels.FALSE_ALARM]
-        changes = _about_changes(residuals, bulk, basis, growth, coloured=bool(colour))
-        doubts += lines or changes or (colour if not found else [])
+            colour = colour[: left.correlation[1] < levels.FALSE_ALARM]
+        changes = _about_changes(left, coloured=bool(colour))
+        doubts += left.lines or changes or ([] if misfit else colour)
     notes += (Note(DOUBT, doubt) for doubt in doubts)
     if notes and in_time and not residuals.coloured and compute_status(notes) == DOUBTFUL:
         notes.append(
@@ -168,24 +207,19 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
                 "coloured, gives intervals that allow for such noise.",
             )
         )
-    return Remainder(notes, found.misfit if found else None)
+    return notes
 
 
-def _misfit(
-    residuals: Residuals,
-    left: tuple[Array, Array],
-    bulk: tuple[Array, Array],
-    times: float,
-    scale: float,
-) -> Remainder:
-    """Return the note on a misfit that is some times the noise, and whether it widens limits."""
-    if has_uneven_noise(left[0], residuals.trace.rounding):
+def _misfit(left: _Left, residual: Array, slopes: Array) -> tuple[Note, tuple[float, float] | None]:
+    """Return the note on a misfit, and its worth and freedom if limits allow for it."""
+    residuals, times, scale = left.likelihood.problem.residuals, left.times, left.scale
+    if has_uneven_noise(residual, residuals.trace.rounding):
         text = (
             "The noise differs from one part of the trace to another, and the intervals do not "
             "allow for that: leave out the readings that scatter most (--from, --until), or give "
             "standard deviations (--sd)."
         )
-        return Remainder([Note(DOUBT, text)])
+        return Note(DOUBT, text), None
     more, read = plain(times, 2), residuals.trace.readings
     share = scale * float(np.sqrt(times**2 - 1)) / residuals.peak
     relative = residuals.course.sweeps and residuals.coloured
@@ -196,7 +230,7 @@ def _misfit(
             "Most readings repeat the one before, as of a sensor that is read less often than it "
             "is logged: keep one of each."
         )
-    elif not residuals.course.sweeps and has_fast_noise(residuals, *left):
+    elif not residuals.course.sweeps and has_fast_noise(residuals, residual, slopes):
         text = (
             f"The misfit is {more} times the noise of neighbouring readings, as of noise that is "
             "correlated for a short time."
@@ -208,15 +242,15 @@ def _misfit(
         )
     else:
         text = f"The misfit is {more} times the noise of the trace, and {of_peak}: {suspects}."
-        return Remainder([Note(REJECTION, text)])
-    misfit = as_correlated(*bulk)
+        return Note(REJECTION, text), None
+    misfit = as_correlated(left.bulk, left.basis)
     if misfit[0] < 1:
         slow = "broad as the sweep" if residuals.course.sweeps else "slow as the trace"
         text += f" It is as {slow}, which the limits allow for."
     else:
         counted_as = f"{plain(misfit[0], 2)} independent ones"
-        text += f" The limits count the {len(bulk[0])} residuals as {counted_as}."
-    return Remainder([Note(DOUBT, text)], misfit)
+        text += f" The limits count the {len(left.bulk)} residuals as {counted_as}."
+    return Note(DOUBT, text), misfit
 
 
 def name_suspects(residuals: Residuals, times: float, scale: float) -> str:
@@ -261,14 +295,10 @@ def _about_growth(
     yield text
 
 
-def _about_colour(
-    residual: Array,
-    basis: Array,
-    correlation: float,
-    chance: float,
-    suspects: Callable[[], str],
-) -> Iterator[str]:
-    """Yield a sentence for each test of white noise that residuals, (n_samples,), fail."""
+def _about_colour(left: _Left) -> Iterator[str]:
+    """Yield a sentence for each test of white noise that residuals fail."""
+    residual, basis, (correlation, chance) = left.bulk, left.basis, left.correlation
+    suspects = partial(name_suspects, left.likelihood.problem.residuals, left.times, left.scale)
     if chance < levels.FALSE_ALARM:
         yield (
             f"Neighbouring residuals are correlated ({correlation:.2f}; white noise would give "
@@ -310,11 +340,10 @@ def _lines(residual: Array, basis: Array, residuals: Residuals, scale: float) ->
         )
 
 
-def _about_changes(
-    residuals: Residuals, residual: Array, basis: Array, growth: Array, *, coloured: bool
-) -> list[str]:
+def _about_changes(left: _Left, *, coloured: bool) -> list[str]:
     """Return a sentence on a change within the trace, if it explains what its fit leaves."""
-    trace = residuals.trace
+    residuals, residual, basis = left.likelihood.problem.residuals, left.bulk, left.basis
+    trace, growth = residuals.trace, left.growth
     if residuals.course.sweeps:
         return [] if coloured else list(about_moduli(residuals, residual, basis, growth))
     cleared = trace.condensed.cleared

@@ -20,7 +20,7 @@ from biogrip.judging import levels
 from biogrip.judging.doubts import MANY, middle_of
 from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.verdicts import Finding
-from biogrip.judging.whiteness import Steps, averaged, parts_apart, steps_of
+from biogrip.judging.whiteness import averaged, parts_apart, steps_of
 from biogrip.physics.noise import without
 from biogrip.physics.simulation import simulated_response
 
@@ -53,6 +53,8 @@ class Hidden:
 
 def find_hidden(likelihood: Likelihood, findings: Sequence[Finding]) -> list[Hidden]:
     """Return the worst error of each kind that moves a quantity with two limits, none of `MANY`."""
+    from scipy.special import chdtri
+
     residuals, best = likelihood.problem.residuals, likelihood.best
     limited = [each for each in findings if each.low is not None and each.high is not None]
     if residuals.samples > MANY or not limited:
@@ -60,12 +62,21 @@ def find_hidden(likelihood: Likelihood, findings: Sequence[Finding]) -> list[Hid
     _, slopes = residuals(best)
     nuisance = residuals.trace.condensed.nuisance
     basis = absorbed(np.vstack((slopes, nuisance)))
-    tests = basis, steps_of(basis, residuals.trace.condensed.cleared), middle_of(residuals)
+    steps = steps_of(basis, residuals.trace.condensed.cleared)
+    # Of a sum of squares with as many degrees of freedom the mean is that of noise.
+    others = [
+        rows / np.sqrt(chdtri(len(rows), levels.FALSE_ALARM) - len(rows))
+        for rows in (parts_apart(basis, middle_of(residuals)), averaged(basis))
+        if len(rows)
+    ]
+    critical = steps.critical(levels.FALSE_ALARM)
     information = slopes @ slopes.T / likelihood.noise_sd**2 + np.eye(len(slopes))
     worst: dict[str, Hidden] = {}
     for kind, words, unit, most_size, shape in _planted(likelihood):
         changed = residuals.trace.condensed.cleared(shape)
-        told = _told(without(basis, changed) / likelihood.noise_sd, *tests)
+        left = without(basis, changed) / likelihood.noise_sd
+        of_step = float(np.max(np.abs(steps.along(left)), initial=0.0)) / critical
+        told = max([of_step, *(float(np.linalg.norm(rows @ left)) for rows in others)])
         moved = np.linalg.solve(information, slopes @ changed) / likelihood.noise_sd**2
         of_one = [float(each.quantity.gradient(best) @ moved) for each in limited]
         twofold = max(map(abs, of_one)) / np.log(2)
@@ -85,20 +96,6 @@ def _beyond(finding: Finding, moves: dict[str, float]) -> float:
     profile = finding.profile
     low, high = (abs((end or 0.0) - profile.best) for end in (profile.low, profile.high))
     return abs(moves[finding.quantity.label]) / max(min(low, high), 1e-12)
-
-
-def _told(left: Array, basis: Array, steps: Steps, split: int) -> float:
-    """Return an error, (n_samples,) in noise, over the size that the most sensitive test misses."""
-    from scipy.special import chdtri
-
-    scanned = np.abs(steps.along(left))
-    found = [float(np.max(scanned, initial=0.0)) / steps.critical(levels.FALSE_ALARM)]
-    for rows in (parts_apart(basis, split), averaged(basis)):
-        if len(rows):
-            # Of a sum of squares with as many degrees of freedom the mean is that of noise.
-            more = chdtri(len(rows), levels.FALSE_ALARM) - len(rows)
-            found.append(float(np.linalg.norm(rows @ left) / np.sqrt(more)))
-    return max(found)
 
 
 def _planted(likelihood: Likelihood) -> Iterator[tuple[str, str, float, float, Array]]:

@@ -164,14 +164,17 @@ def find_line(residual: Array, time_s: Array) -> tuple[float, float, Array]:
     n, apart = len(residual), np.diff(time_s)
     if n < 4 * levels.PERIODS or np.ptp(apart) > levels.EVEN * np.median(apart):
         return 0.0, 1.0, np.zeros((0, n))
-    fine = np.abs(np.fft.rfft(residual, _FINER * n)[: _FINER * ((n + 1) // 2)]) ** 2
-    power = fine[_FINER::_FINER]
+    power = np.abs(np.fft.rfft(residual)[1 : (n + 1) // 2]) ** 2
     share = np.max(power[levels.PERIODS - 1 :]) / np.sum(power)
+    chance = min(len(power) * float(1 - share) ** (len(power) - 1), 1.0)
+    if chance >= levels.FALSE_ALARM:
+        return 0.0, chance, np.zeros((0, n))
+    fine = np.abs(np.fft.rfft(residual, _FINER * n)[: _FINER * ((n + 1) // 2)]) ** 2
     slowest = _FINER * levels.PERIODS
     frequency = (slowest + np.argmax(fine[slowest:])) / (_FINER * n * np.mean(apart))
     angle = 2 * np.pi * frequency * time_s
     basis = np.linalg.qr(np.column_stack((np.cos(angle), np.sin(angle))))[0].T
-    return float(frequency), min(len(power) * float(1 - share) ** (len(power) - 1), 1.0), basis
+    return float(frequency), chance, basis
 
 
 def by_leverage(residual: Array, basis: Array) -> Array:

@@ -23,7 +23,7 @@ from biogrip.physics.noise import rms
 from biogrip.records.identifications import read_verdicts
 from biogrip.records.rows import read_table, whole
 from biogrip.records.traces import read_measurements
-from biogrip.stages.identification import TRACE
+from biogrip.stages.judgement import TRACE
 from biogrip.study.study import Case, Study
 from biogrip.tables.cases import target_of
 from biogrip.terminal import visible

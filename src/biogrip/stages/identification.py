@@ -1,34 +1,25 @@
-"""Identification of the sample in noisy traces: by a method, with every sample model, with limits.
+"""Identification of the sample in noisy traces: by a method, and with every sample model.
 
 A job has a batch of the seeds of a case. `identify` writes what a method finds in each trace, with
 the history of its search; `join` puts the batches of a case together, a row per method and seed,
 with what the genes could have held of each trace. `fit` writes the misfits of all sample models,
-for model selection. `judge` writes verdicts on the first trace of a case, as `biogrip identify`
-judges it; of a simulated one the experiment is known, so that neither start, offset, drift nor
-model are doubted. `expect` writes those to expect of any, from the trace without noise. Traces are
-fitted in groups, which are small enough for little memory; results do not depend on the grouping.
+for model selection. Traces are fitted in groups, which are small enough for little memory; results
+do not depend on the grouping.
 """
 
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from biogrip.arrays import parts
-from biogrip.digits import rounded_numbers
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.genome import lowest_encodable
-from biogrip.fit.least_squares import identify_from
 from biogrip.fit.nested_fits import fit_models
 from biogrip.fit.problem import identifier
-from biogrip.identify.data import judged_data
-from biogrip.identify.identify import identify_alike
-from biogrip.identify.prepare import for_trace
-from biogrip.judging.diagnosis import Diagnosis, diagnose
-from biogrip.physics.noise import rms, standard_deviation, stream
+from biogrip.physics.noise import rms, stream
 from biogrip.records.identifications import (
     ENCODABLE,
     MODEL_FITS,
@@ -43,10 +34,9 @@ from biogrip.records.rows import (
     read_arrays,
     read_rows,
     write_arrays,
-    write_object,
     write_rows,
 )
-from biogrip.records.traces import Measurements, read_measurements, read_target
+from biogrip.records.traces import Measurements, read_measurements
 from biogrip.study.study import Case
 from biogrip.terminal import Progress
 
@@ -149,10 +139,6 @@ def fit(
     MODEL_FITS.write(fits, (row for of_model in rows.values() for row in of_model))
 
 
-TRACE = 0
-"""Seed of the trace that is judged."""
-
-
 def experiment_for(
     experiment: Experiment, measurements: Measurements, calibrated: Sequence[Path]
 ) -> Experiment:
@@ -160,41 +146,7 @@ def experiment_for(
     experiment = experiment.calibrated(calibrated)
     if experiment.simulated:
         return experiment.weighted(measurements.sd)
+    # Imported here: of a simulated trace nothing has to be judged.
+    from biogrip.identify.prepare import for_trace
+
     return for_trace(experiment, measurements.recording)
-
-
-def judge(case: Case, measurements: Path, calibrated: list[Path], verdicts: Path) -> None:
-    """Identify the trace of seed 0, and write verdicts, profiles and valley."""
-    recorded = read_measurements(measurements, [TRACE])
-    experiment = experiment_for(case.judged_experiment, recorded, calibrated)
-    (diagnosis,) = identify_alike([(recorded.recording, experiment)], valley=True)
-    assert diagnosis.fit
-    more = {"noise_model": diagnosis.fit.noise_data(), "valley": diagnosis.valley}
-    _write(verdicts, case, diagnosis, more)
-
-
-def expect(case: Case, target: Path, calibrated: list[Path], expected: Path) -> None:
-    """Write verdicts on the trace without noise, judged with the noise level of the measurement.
-
-    They are what to expect of any trace of the case. Without noise, the rounding of the
-    target's digits takes its place.
-    """
-    experiment = case.experiment.to_identify().calibrated(calibrated)
-    time_s, _, rotation = read_target(target, case.times_s)
-    noise_sd = rms(standard_deviation(rotation, case.noise)) or None
-    problem = experiment.of(time_s, rotation, noise_sd=noise_sd)
-    found = identify_from(problem, experiment.logs(case.parameters))
-    diagnosis = diagnose(
-        problem, experiment.searched, found, confidence=case.confidence, noise_sd=noise_sd
-    )
-    _write(expected, case, diagnosis, {})
-
-
-def _write(path: Path, case: Case, diagnosis: Diagnosis, more: dict[str, Any]) -> None:
-    """Write a diagnosis as JSON. The case says what is read, and no name has its unit."""
-    said = {
-        key.removesuffix("_rad"): value
-        for key, value in rounded_numbers(judged_data(diagnosis)).items()
-    }
-    head = {"case": case.name, "model": case.sample.model.name, "confidence": case.confidence}
-    write_object(path, head | said | more)

@@ -13,7 +13,6 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.files import write_text
-from biogrip.identify.prepare import prepare
 from biogrip.physics.calibration import FreeMotion, calibrate, calibration_yaml, free_motion
 from biogrip.physics.noise import Noise, add_noise, stream
 from biogrip.physics.protocol import evaluate, sample_times
@@ -24,7 +23,6 @@ from biogrip.records.traces import Measurements, read_target, write_measurements
 from biogrip.study.study import Case
 from biogrip.terminal import warn
 from biogrip.traces.columns import place
-from biogrip.traces.reader import read_recording
 
 
 def simulate(case: Case, target: Path) -> None:
@@ -110,6 +108,10 @@ def record(case: Case, recorded: Path, measurements: Path) -> None:
     """Read, check and convert the user's file; errors name file, line and column."""
     if case.columns.load is not None:
         raise BiogripError(f"{place(recorded)}: measurement.load is only for biogrip identify.")
+    # Imported here: a simulated trace needs neither.
+    from biogrip.identify.prepare import prepare
+    from biogrip.traces.reader import read_recording
+
     trace, _ = prepare(read_recording(recorded, case.columns), case.experiment)
     remarks = tuple(trace.remarks())
     for remark in remarks:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from scipy.stats import binomtest
+from scipy.special import betaincinv
 
 from biogrip.fit.nested_fits import aic_and_bic
 from biogrip.judging.levels import WIDE
@@ -320,5 +320,7 @@ def _counts(found: pd.DataFrame, target: float | None) -> Iterator[Row]:
 
 def _interval(name: str, count: int, tried: int) -> Row:
     """Return the 95 % interval of Clopper and Pearson for a share, in percent."""
-    low, high = binomtest(count, tried).proportion_ci(0.95, method="exact")
+    missed = tried - count
+    low = betaincinv(count, missed + 1, 0.025) if count else 0.0
+    high = betaincinv(count + 1, missed, 0.975) if missed else 1.0
     return {f"{name}_from_percent": 100 * low, f"{name}_to_percent": 100 * high}

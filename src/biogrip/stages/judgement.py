@@ -1,32 +1,83 @@
-"""Estimates and intervals of many seeds, to test the coverage of limits and the spread of fits.
+"""Judgement of a case: verdicts on its first trace, those to expect, and intervals of many seeds.
 
-Every seed is fitted by least squares, and quantities that traces should determine get limits from
-their profile likelihoods. A second estimate has parameters without information fixed at their true
-values, as the Cramér-Rao bound assumes. Some seeds get a full verdict as well, as users are shown
-it: multiples of `verdicts_every`, whatever the batch.
+`judge` writes verdicts on the first trace of a case, as `biogrip identify` judges it; of a
+simulated one the experiment is known, so that neither start, offset, drift nor model are doubted.
+`expect` writes those to expect of any, from the trace without noise.
+
+`estimate` tests the coverage of limits and the spread of fits. Every seed is fitted by least
+squares, and quantities that traces should determine get limits from their profile likelihoods. A
+second estimate has parameters without information fixed at their true values, as the Cramér-Rao
+bound assumes. Some seeds get a full verdict as well, as users are shown it: multiples of
+`verdicts_every`, whatever the batch.
 """
 
 import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from biogrip.arrays import Array, IntArray
+from biogrip.digits import rounded_numbers
 from biogrip.fit.experiment import Experiment
-from biogrip.fit.least_squares import fit_from
+from biogrip.fit.least_squares import fit_from, identify_from
 from biogrip.fit.trace_fit import TraceFit, fit_least_squares
-from biogrip.judging.diagnosis import Diagnosis, profiled, settled
+from biogrip.identify.data import judged_data
+from biogrip.identify.identify import identify_alike
+from biogrip.judging.diagnosis import Diagnosis, diagnose, profiled, settled
 from biogrip.judging.likelihood import Likelihood, covariance
 from biogrip.judging.quantities import Quantity, parameters_and_sum
 from biogrip.judging.verdicts import DETERMINED, Finding, compute_findings
-from biogrip.physics.noise import add_noise, standard_deviation
+from biogrip.physics.noise import add_noise, rms, standard_deviation
 from biogrip.physics.sample_model import SampleModel, with_fixed
 from biogrip.records.identifications import INTERVALS, read_verdicts
-from biogrip.records.traces import read_target
-from biogrip.stages.identification import groups
+from biogrip.records.rows import write_object
+from biogrip.records.traces import read_measurements, read_target
+from biogrip.stages.identification import experiment_for, groups
 from biogrip.study.study import Case
 from biogrip.terminal import Progress
+
+TRACE = 0
+"""Seed of the trace that is judged."""
+
+
+def judge(case: Case, measurements: Path, calibrated: list[Path], verdicts: Path) -> None:
+    """Identify the trace of seed 0, and write verdicts, profiles and valley."""
+    recorded = read_measurements(measurements, [TRACE])
+    experiment = experiment_for(case.judged_experiment, recorded, calibrated)
+    (diagnosis,) = identify_alike([(recorded.recording, experiment)], valley=True)
+    assert diagnosis.fit
+    more = {"noise_model": diagnosis.fit.noise_data(), "valley": diagnosis.valley}
+    _write(verdicts, case, diagnosis, more)
+
+
+def expect(case: Case, target: Path, calibrated: list[Path], expected: Path) -> None:
+    """Write verdicts on the trace without noise, judged with the noise level of the measurement.
+
+    They are what to expect of any trace of the case. Without noise, the rounding of the
+    target's digits takes its place.
+    """
+    experiment = case.experiment.to_identify().calibrated(calibrated)
+    time_s, _, rotation = read_target(target, case.times_s)
+    noise_sd = rms(standard_deviation(rotation, case.noise)) or None
+    problem = experiment.of(time_s, rotation, noise_sd=noise_sd)
+    found = identify_from(problem, experiment.logs(case.parameters))
+    diagnosis = diagnose(
+        problem, experiment.searched, found, confidence=case.confidence, noise_sd=noise_sd
+    )
+    _write(expected, case, diagnosis, {})
+
+
+def _write(path: Path, case: Case, diagnosis: Diagnosis, more: dict[str, Any]) -> None:
+    """Write a diagnosis as JSON. The case says what is read, and no name has its unit."""
+    said = {
+        key.removesuffix("_rad"): value
+        for key, value in rounded_numbers(judged_data(diagnosis)).items()
+    }
+    head = {"case": case.name, "model": case.sample.model.name, "confidence": case.confidence}
+    write_object(path, head | said | more)
+
 
 # Significant digits, and those of values known to within a relative `_NARROW`.
 _DIGITS, _MORE_DIGITS, _NARROW = 5, 9, 1e-3
@@ -130,7 +181,9 @@ def judge_quantities(
         return [profiled(*pair, []) for pair in zip(likelihoods, every, strict=True)]
 
     problems, found = [fit.problem for fit in fits], [fit.found for fit in fits]
-    return settled(problems, found, profile, confidence=confidence, noise_sd=[None] * len(fits))
+    noise_sd = [None] * len(fits)
+    judged = settled(problems, found, profile, confidence=confidence, noise_sd=noise_sd)
+    return [diagnosis for diagnosis, _ in judged]
 
 
 def _estimates(
