@@ -28,7 +28,8 @@ def rounded(value: float | None) -> float | None:
         return None
     for digits in range(_DIGITS, _MOST_DIGITS):
         found = float(f"{value:.{digits}g}")
-        if all(f"{found:.{few}g}" == f"{value:.{few}g}" for few in range(2, _DIGITS)):
+        fewer = range(2, _DIGITS)
+        if found == value or all(f"{found:.{few}g}" == f"{value:.{few}g}" for few in fewer):
             return found
     return float(f"{value:.{_DIGITS}g}")
 

@@ -110,8 +110,9 @@ def compute_modes(
         parameters = (parameters * factors).reshape(-1, count)
     network = model.network(parameters)
     if not course.deforms:
-        found = _between_arms(gripper, network, count)
-        return Modes(*(np.ascontiguousarray(np.moveaxis(part, -1, 0)) for part in found))
+        *of_modes, d_rates, d_weights = _between_arms(gripper, network, count)
+        of_slopes = (of.transpose(2, 0, 1) for of in (d_rates, d_weights))
+        return Modes(*map(np.ascontiguousarray, (*(of.T for of in of_modes), *of_slopes)))
     both = [of.reshape(count + 1, -1, of.shape[1]) for of in _branches(network)]
     rates, weights = (np.ascontiguousarray(of[0].real) for of in both)
     return Modes(rates, weights, *((of[1:].imag / _COMPLEX_STEP).swapaxes(0, 1) for of in both))
@@ -139,22 +140,27 @@ def _between_arms(
     x = zeros.values
     moved = np.zeros((count, *x.shape)) - d_level[:, None]
     steepness = np.zeros_like(x)
-    branches = list(zip(impedance.weights, impedance.rates, d_weights, d_rates, strict=True))
-    for weight, rate, d_weight, d_rate in branches:
-        inverse = 1 / zeros.from_pole(rate)
-        steepness += weight * (x * inverse) ** 2
-        moved += d_weight[:, None] * inverse
-        if np.any(d_rate):
-            moved += (weight * d_rate)[:, None] * (inverse * inverse)
-    moved *= x * x / steepness
-    steepening = np.zeros_like(moved)
-    for weight, rate, d_weight, d_rate in branches:
+    branches = []
+    for weight, rate, d_weight, d_rate in zip(
+        impedance.weights, impedance.rates, d_weights, d_rates, strict=True
+    ):
         inverse = 1 / zeros.from_pole(rate)
         ratio = x * inverse
+        steepness += weight * ratio**2
+        if not count:
+            continue
+        moves = d_rate.any()
+        moved += d_weight[:, None] * inverse
+        if moves:
+            moved += (weight * d_rate)[:, None] * (inverse * inverse)
+        branches.append((weight, rate, d_weight, d_rate if moves else None, inverse, ratio))
+    moved *= x * x / steepness
+    steepening = np.zeros_like(moved)
+    for weight, rate, d_weight, d_moving, inverse, ratio in branches:
         away = 2 * weight * rate * ratio * inverse * inverse
         steepening += d_weight[:, None] * (ratio * ratio) - moved * away
-        if np.any(d_rate):
-            steepening += d_rate[:, None] * (2 * weight * (ratio * inverse) * ratio)
+        if d_moving is not None:
+            steepening += d_moving[:, None] * (2 * weight * (ratio * inverse) * ratio)
     numerators, slopes = (of[LEFT] for of in arms.rotations(zeros))
     weights = -numerators / steepness
     weight_slopes = -(slopes * moved + weights * steepening) / steepness

@@ -122,30 +122,33 @@ class ModeRows:
         """Return rows of responses with derivatives, (n, 1 + n_parameters, n_rows)."""
         count, parameters, n_modes = modes.rate_slopes.shape
         scaled, width = -self._end_s * modes.rates, _WIDTH / _SHORTER_OF_ROWS
-        scaled_slopes = -self._end_s * modes.rate_slopes
         u = np.log1p(scaled) / width
         lasts = u < self._last
         piece = np.where(lasts, u, self._last).astype(np.intp)
         beyond = self._decayed / np.maximum(scaled, self._decayed)
-        powers, power_slopes = _powers(np.where(lasts, u - piece, beyond))
-        # The divisor, and the place, with their derivatives by the log-parameters.
-        place_slopes = np.where(
-            lasts, 1 / (width * (1 + scaled)), -beyond / np.maximum(scaled, self._decayed)
-        )
-        place_slopes = place_slopes[:, None] * scaled_slopes
+        powers = _powers(np.where(lasts, u - piece, beyond))
         scale = _divisor(scaled, self._decayed, self._deforms)
-        scale_slopes = np.where(lasts, 1.0, 0.0)[:, None] * scaled_slopes
-        if self._deforms:
-            # What a fast mode has not forgotten falls with its rate.
-            scale_slopes = -(scale * scale)[:, None] * scaled_slopes
         amplitudes = modes.weights * scale
-        amplitude_slopes = modes.weight_slopes * scale[:, None]
-        amplitude_slopes += modes.weights[:, None] * scale_slopes
-        moved = amplitudes[:, None] * place_slopes
         mixed = np.empty((count, 1 + parameters, n_modes, len(_ORDERS)))
         np.multiply(amplitudes[..., None], powers, out=mixed[:, 0])
-        np.multiply(amplitude_slopes[..., None], powers[:, None], out=mixed[:, 1:])
-        mixed[:, 1:] += moved[..., None] * power_slopes[:, None]
+        if parameters:
+            # The divisor, and the place, with their derivatives by the log-parameters.
+            scaled_slopes = -self._end_s * modes.rate_slopes
+            place_slopes = np.where(
+                lasts, 1 / (width * (1 + scaled)), -beyond / np.maximum(scaled, self._decayed)
+            )
+            place_slopes = place_slopes[:, None] * scaled_slopes
+            scale_slopes = np.where(lasts, 1.0, 0.0)[:, None] * scaled_slopes
+            if self._deforms:
+                # What a fast mode has not forgotten falls with its rate.
+                scale_slopes = -(scale * scale)[:, None] * scaled_slopes
+            amplitude_slopes = modes.weight_slopes * scale[:, None]
+            amplitude_slopes += modes.weights[:, None] * scale_slopes
+            moved = amplitudes[:, None] * place_slopes
+            np.multiply(amplitude_slopes[..., None], powers[:, None], out=mixed[:, 1:])
+            # The power of order 0 stays.
+            power_slopes = _ORDERS[1:] * powers[..., :-1]
+            mixed[:, 1:, :, 1:] += moved[..., None] * power_slopes[:, None]
         # One product per sample: the order of its sums does not depend on the number of samples.
         pieces = self._table[piece].reshape(count, -1, self._table.shape[2])
         return mixed.reshape(count, 1 + parameters, -1) @ pieces
@@ -217,11 +220,9 @@ def _divisor(scaled: Array, decayed: float, deforms: bool) -> Array:
     return 1 / (1 + scaled) if deforms else np.minimum(scaled, decayed)
 
 
-def _powers(place: Array) -> tuple[Array, Array]:
-    """Return powers, and their derivatives, of shape (..., degree + 1)."""
+def _powers(place: Array) -> Array:
+    """Return powers, of shape (..., degree + 1)."""
     powers = np.ones((*place.shape, len(_ORDERS)))
     for order in _ORDERS[1:]:
-        powers[..., order] = powers[..., order - 1] * place
-    slopes = np.zeros_like(powers)
-    slopes[..., 1:] = _ORDERS[1:] * powers[..., :-1]
-    return powers, slopes
+        np.multiply(powers[..., order - 1], place, out=powers[..., order])
+    return powers

@@ -294,6 +294,8 @@ def ascending_branches(network: Network) -> tuple[NDArray[Any], NDArray[Any]]:
 
 def ascending(weights: NDArray[Any], rates: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
     """Return branches, (n_branches, n), ordered by their rates, equal rates moved apart."""
+    if len(rates) < 2:
+        return weights, rates
     order = np.argsort(rates.real, axis=0, kind="stable")
     weights, rates = (np.take_along_axis(of, order, axis=0) for of in (weights, rates))
     for slower, rate in pairwise(rates):
