@@ -176,9 +176,6 @@ class SpanningModes:
 @lru_cache(maxsize=16)
 def _spanning(halvings: int, orders: int, deforms: bool) -> tuple[Array, float, Array]:
     """Return rates over T, one beyond which nothing lasts, and the table of `ModeRows`."""
-    # Imported here: the genetic algorithm does not need it, and loading takes long.
-    from scipy.linalg import qr
-
     elapsed = np.exp(-np.arange(0.0, halvings * np.log(2) + _SPACING_OF_TIMES, _SPACING_OF_TIMES))
 
     def jumps(rates: Array) -> Array:
@@ -192,14 +189,13 @@ def _spanning(halvings: int, orders: int, deforms: bool) -> tuple[Array, float, 
     candidates = -np.expm1(np.arange(_SPACING_OF_RATES, last, _SPACING_OF_RATES))
     found = jumps(candidates)
     sizes = np.max(np.abs(found), axis=1, keepdims=True)
-    basis, triangle, order = qr(found / sizes, mode="economic", pivoting=True)
-    left = np.abs(np.diagonal(triangle))
-    count = int(np.count_nonzero(left > _LEFT_OUT * left[0]))
-    rates, basis = candidates[order[:count]], basis[:, :count] / sizes
+    chosen = _independent(found / sizes)
+    basis, triangle = np.linalg.qr((found / sizes)[:, chosen])
+    rates, basis = candidates[chosen], basis / sizes
 
     def values(scaled: Array) -> Array:
         """Return shares of modes in tabulated rows, by -T r, (n_modes, n)."""
-        shares = np.linalg.solve(triangle[:count, :count], basis.T @ jumps(-scaled))
+        shares = np.linalg.solve(triangle, basis.T @ jumps(-scaled))
         return shares / (_scale(-scaled, deforms) * _divisor(scaled, decayed, deforms))
 
     pieces = [
@@ -208,6 +204,19 @@ def _spanning(halvings: int, orders: int, deforms: bool) -> tuple[Array, float, 
     ]
     beyond = values(decayed / _SHORT_NODES) @ _TO_SERIES @ _TO_POWERS
     return rates, decayed, np.concatenate([*pieces, beyond[:, None]], axis=1)
+
+
+def _independent(columns: Array) -> list[int]:
+    """Return the columns that a pivoted QR takes, up to `_LEFT_OUT`: importing SciPy's is slow."""
+    left, chosen = columns.copy(), list[int]()
+    sizes = np.linalg.norm(left, axis=0)
+    least = _LEFT_OUT * sizes.max()
+    while np.any(sizes > least):
+        chosen.append(int(np.argmax(sizes)))
+        direction = left[:, chosen[-1]] / sizes[chosen[-1]]
+        left -= np.outer(direction, direction @ left)
+        sizes = np.linalg.norm(left, axis=0)
+    return chosen
 
 
 def _scale(rates: Array, deforms: bool) -> Array:
