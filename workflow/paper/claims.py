@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 import yaml
-from scipy.stats import binom
+from scipy.special import bdtr
 
 from biogrip.arrays import Array
 from biogrip.judging.verdicts import DETERMINED
@@ -99,7 +99,8 @@ def in_words(hits: int, runs: int) -> str:
 def median_with_limits(values: Array) -> tuple[float, float, float]:
     """Return the median of values, (n,), and its 95 % interval from their order."""
     ordered, count = np.sort(values), len(values)
-    first = max(int(binom.ppf(0.025, count, 0.5)) - 1, 0)
+    binomial = bdtr(np.arange(count), count, 0.5)
+    first = max(int(np.searchsorted(binomial, 0.025)) - 1, 0)
     return float(np.median(values)), float(ordered[first]), float(ordered[count - 1 - first])
 
 

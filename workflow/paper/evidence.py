@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from biogrip.digits import counted
 from biogrip.fit.genome import nearest_encodable
@@ -182,7 +182,7 @@ def sampling_evidence(study: Study) -> ShownTable:
         ratios = np.sqrt(np.mean((errors / bounds) ** 2, axis=0))
         found.append(("all", "error / bound", None, None, None, *ratios))
         near = bounds[:, _RATES_HZ.index(_NEAR)]
-        tails = chi2.ppf(((1 - _MIDDLE) / 2, (1 + _MIDDLE) / 2), len(errors))
+        tails = chdtri(len(errors), [(1 + _MIDDLE) / 2, (1 - _MIDDLE) / 2])
         rates = _NEAR * tails / np.sum((errors[:, 0] / near) ** 2)
         found.append(("all", "rates (Hz)", None, *rates))
     caption = (
