@@ -1,3 +1,4 @@
+import json
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from biogrip.physics.protocol import Phase, hold, join_phases, sample_times
 from biogrip.records.traces import read_measurements, read_target
 from biogrip.stages import targets as target
 from biogrip.stages.identification import experiment_for
+from biogrip.stages.judgement import expect
 from tests.helpers.default import STUDY, seen, study_of
 from tests.helpers.places import EXAMPLE
 
@@ -66,3 +68,14 @@ def test_all_stages_weight_the_readings_of_a_recorded_trace(tmp_path: Path) -> N
     found = experiment_for(case.experiment, read_measurements(tmp_path / "t.npz", [0]), [])
     assert found.sd is not None
     assert found.noise_sd == pytest.approx(np.sqrt(np.mean(found.sd**2)))
+
+
+def test_without_noise_the_fit_is_the_truth_and_not_the_rounding_of_digits(tmp_path: Path) -> None:
+    case, file = STUDY.case("endothelial_cell"), tmp_path / "expected.json"
+    target.simulate(case, tmp_path / "target.csv")
+    expect(case, tmp_path / "target.csv", [], file)
+    found = json.loads(file.read_text())
+    values = {each["quantity"]: each["value"] for each in found["quantities"]}
+    # The damper that is not there has the lower end of its search range.
+    assert values == {"k": 35.0, "k_p": 12.3, "c": 299.9, "c_p": 0.001, "c + c_p": 299.9}
+    assert found["fit"] == "ok"
