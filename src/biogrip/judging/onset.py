@@ -161,6 +161,14 @@ class OnsetFits:
         fit = fit_from([self.posed(onset_s)], near)
         return OnsetFit(onset_s, fit.x[0], float(fit.misfit[0]))
 
+    def given(self, likelihood: Likelihood) -> OnsetFit:
+        """Return the fit for an onset at 0: that of a likelihood if it is in white noise, too."""
+        own, best = likelihood.problem.residuals, likelihood.best
+        projected = self.posed(0.0).residuals.trace.condensed.nuisance
+        if own.coloured or not np.array_equal(own.trace.condensed.nuisance, projected):
+            return self.at(0.0, best)
+        return OnsetFit(0.0, best, likelihood.misfit)
+
     @cached_property
     def _latest_s(self) -> float:
         """Latest onset, which leaves readings enough to fit the sample."""
@@ -288,7 +296,7 @@ def notes_on_start(
 def _about_late_onset(fits: OnsetFits, diagnosis: Diagnosis, guess_s: float) -> Iterator[Note]:
     """Yield a note if a trace is constant up to an onset, with which it fits far better."""
     trace, noise_sd = (fits.time_s, fits.readings), fits.experiment.noise_sd
-    given, needed = fits.at(0.0, diagnosis.likelihood.best), chdtri(1, levels.SURELY)
+    given, needed = fits.given(diagnosis.likelihood), chdtri(1, levels.SURELY)
     fall_to = partial(compute_fall, len(trace[0]), given.misfit, noise_sd=noise_sd)
     # Fitted along, a start cannot gain more than any sample, but for what moving it a little does.
     if fall_to(fit_any_sample(fits.posed(guess_s).residuals).misfit) < _MOSTLY * needed:
@@ -342,7 +350,7 @@ def is_cut_off(time_s: Array) -> bool:
 def _about_clock(fits: OnsetFits, diagnosis: Diagnosis) -> Iterator[Note]:
     """Yield a note if a trace may be on another clock, with its step some time before it."""
     time_s, best = fits.time_s, diagnosis.likelihood.best
-    later_s, given = 2 * time_s[0] - time_s[1], fits.at(0.0, best)
+    later_s, given = 2 * time_s[0] - time_s[1], fits.given(diagnosis.likelihood)
     rejected = diagnosis.status == REJECTED
     level, white_sd = chdtri(1, levels.SURELY), levels.WHITE * estimate_noise(fits.readings)
     tried_s = np.linspace(0.0, later_s, _BETWEEN + 1)[1:].tolist()
@@ -411,7 +419,8 @@ def _moved(
 def _about_ramp(fits: OnsetFits, diagnosis: Diagnosis, ramped: Experiment) -> Iterator[Note]:
     """Yield a note if a ramp up to the first reading moves a value out, or a short one before 0."""
     best, delay_s = diagnosis.likelihood.best, float(fits.time_s[0])
-    given, other = fits.at(0.0, best), replace(fits, experiment=ramped).at(0.0, best)
+    given = fits.given(diagnosis.likelihood)
+    other = replace(fits, experiment=ramped).at(0.0, best)
     said, how = [], "A ramp is given by a protocol (--config), or as recorded (--load)."
     if moved := _moved(diagnosis, given, [other], 1.0):
         ends = f"ends with the first reading, at {plain(delay_s)} s"
