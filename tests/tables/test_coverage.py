@@ -58,7 +58,7 @@ def test_verdicts_are_counted_beside_intervals(tmp_path: Path, target: Path) -> 
     assert [k[f"shown_{name}"] for name in shown] == [2, 1, 0, 1, 1]
     assert [c_p[f"shown_{name}"] for name in shown] == [2, 0, 0, 2, 1]
     assert "bound_percent" not in c_p
-    assert "in every 2th seed" in str(made)
+    assert "in one of 2 seeds" in str(made)
     # A batch that lost its end is refused, whatever is left of it.
     lines = file.read_text().splitlines(keepends=True)
     for kept in range(1, len(lines)):

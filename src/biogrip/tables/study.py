@@ -227,7 +227,7 @@ def _judged_seeds(study: Study) -> str:
     every = {case.block.identifiability.verdicts_every for case in study.cases.values()}
     if len(every) > 1:
         return "some seeds"
-    return "every seed" if 1 in every else f"every {every.pop()}th seed"
+    return "every seed" if 1 in every else f"one of {every.pop()} seeds"
 
 
 def _spreads(found: pd.DataFrame, truth: float, bound: float, confidence: float) -> Row:
