@@ -171,6 +171,18 @@ def test_limits_beyond_the_readings_are_one_sided() -> None:
     assert flows["viscosity"].low == pytest.approx(200, rel=0.1)
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_a_creep_that_ends_says_how_viscous_a_flow_could_be(seed: int) -> None:
+    """Whether the best fit has a slow flow or none, one that shows at the end is excluded.
+
+    A flow of 1/viscosity reaches 100/viscosity, which has to be below ten times the noise of 0.01.
+    """
+    compliance = 1 / 2 + (1 - np.exp(-EVEN / 5)) / 3 + noise(0.01, seed, len(EVEN))
+    viscosity = by_name(tell(EVEN, compliance, reads="strain"))["viscosity"]
+    assert viscosity.verdict == BOUNDED_BELOW
+    assert (viscosity.low or 0.0) > 1000
+
+
 def test_a_ramp_shows_what_a_step_hides() -> None:
     """Of a damper beside a spring the force under a step is the spring's alone."""
     hidden = by_name(tell(TIMES, 100 + noise(1.0)))

@@ -77,13 +77,18 @@ class Lags:
     """True for lags that hardly show, (n_rates,)."""
 
     def _beside(self, chosen: BoolArray) -> tuple[Array, BoolArray]:
-        """Return places of the rates, and the intervals next to lags that are chosen."""
-        return np.log1p(self.covered_s[1] * self.rates), chosen[1:] | chosen[:-1]
+        """Return places of the rates, and the intervals next to lags that are chosen.
+
+        The last interval is none: of lags so fast no reading tells which it is, rounding would.
+        """
+        beside = chosen[1:] | chosen[:-1]
+        beside[-1] = False
+        return np.log1p(self.covered_s[1] * self.rates), beside
 
     def are_close(self, chosen: BoolArray) -> bool:
         """Return True if lags next to chosen ones, (n_rates,), are close, but the fastest two."""
         places, beside = self._beside(chosen)
-        return bool(np.max(np.diff(places)[:-1], where=beside[:-1], initial=0.0) < _CLOSE)
+        return bool(np.max(np.diff(places), where=beside, initial=0.0) < _CLOSE)
 
     def divided(self, chosen: BoolArray) -> "Lags":
         """Return the grid with closer lags on either side of those that are chosen, (n_rates,)."""

@@ -44,9 +44,10 @@ from biogrip.physics.residuals import Residuals
 
 # First digits of the times at which quantities are told and, where these are too few, of more.
 _DIGITS, _FEWEST_TIMES = ((1,), (1, 2, 5)), 2
-# Weight of the row that holds a quantity, in the inverse of its standard deviation; accuracies of
-# the threshold's root, and of ends at which the excess jumps; share of the root that is flat; most
-# fits; growth of steps; most grids.
+# Weight of the row that holds a quantity, over its standard deviation or, if less, a share of it;
+# accuracies of the threshold's root, and of ends at which the excess jumps; share of the root that
+# is flat; most fits; growth of steps; most grids.
+_HELD = 0.1
 _WEIGHT, _ROUGH, _ACCURATE, _CLOSE, _FLAT = 300.0, 0.3, 0.02, 1e-3, 0.03
 _MOST_FITS, _LARGER, _MOST_DIVISIONS = 25, 4.0, 4
 # Least ratio of a time to the first, and of the last to it, for slopes and moduli.
@@ -56,8 +57,6 @@ _HANGS = 10.0
 # Standard deviation of a quantity that counts as none, over the largest that a noise of one lag
 # makes.
 _LEAST = 1e-3
-# Share of what the clearest lag adds that is none.
-_NONE = 1e-9
 
 # Share of a value below which a lower limit says no more than that it is positive.
 _LITTLE = 0.01
@@ -270,7 +269,9 @@ def _told(fit: AnySampleFit, quantity: _Quantity, root: Callable[[int], float]) 
     low, high = (float(end) if end is not None and end > 0 else None for end in ends)
     if quantity.below is not None and max(value or 0.0, high or 0.0) > _MOST:
         value, high = None, None
-    if low is not None and value is not None and low < _LITTLE * max(value, _LITTLE * (high or 0)):
+    # Of a flow that is hardly there the value is any.
+    little = 0.0 if quantity.kind == FLOW else _LITTLE * max(value or 0.0, _LITTLE * (high or 0.0))
+    if low is not None and low < little:
         low = None
     value = None if low is None or high is None or value is None else float(value)
     return Told(quantity.name, quantity.kind, quantity.at_s, quantity.unit, value, low, high)
@@ -295,13 +296,13 @@ class _Profile:
         stride = root(0) * deviation / (divisor or 1.0)
         # Of a liquid the modulus that another is divided by may vanish.
         self._stride = min(stride, _MOST) if quantity.below else stride
-        held = min(deviation, max(0.1 * self.best * divisor, _NONE * clearly))
-        self._weight = _WEIGHT / held if held else 0.0
+        self._deviation, self._divisor = deviation, divisor
         self._open = [it for it in (-1, 1) if np.any(it * row[faint] > _HANGS * clearly)]
 
     def limit(self, side: int) -> float | None:
         """Find the limit on a side, -1 or 1, if there is one."""
-        if not 0 < self._stride < math.inf or side in self._open:
+        nothing = side < 0 and self.best <= 0
+        if not 0 < self._stride < math.inf or side in self._open or nothing:
             return None
         found, needed = self._closely(side, self.best + side * self._stride, self._root(0))
         more = count_lags(self._fit.amplitudes > 0) - count_lags(needed)
@@ -332,10 +333,13 @@ class _Profile:
         seen: BoolArray = np.any(lags.rows, axis=1)
         ratio = self._quantity.below is not None
         rows = np.column_stack((lags.rows, above))
-        measured, weight = np.append(self._fit.measured, 0.0), self._weight
+        measured = np.append(self._fit.measured, 0.0)
         inner, outer = self.best, math.inf
         for _ in range(_MOST_FITS):
             value = value if side > 0 else max(value, 0.0)
+            # Rounding of a row that is far heavier than its value takes would outweigh the trace.
+            held = min(self._deviation, _HELD * max(value, self.best) * self._divisor)
+            weight = _WEIGHT / held
             rows[:, -1] = np.where(seen, weight * (above - value * below), 0.0)
             measured[-1] = 0.0 if ratio else weight * value
             amplitudes, norm = nnls(rows.T, measured, maxiter=100 * len(rows))
