@@ -35,7 +35,7 @@ from biogrip.physics.instruments import GRIPPER, INSTRUMENTS, Instrument
 from biogrip.physics.models import ALIASES, CANDIDATES
 from biogrip.study.experiment_blocks import LONGEST_S, SHORTEST_S
 from biogrip.study.measurement_block import ARRAYS, READINGS, MeasurementBlock
-from biogrip.study.messages import checked, schema_of
+from biogrip.study.messages import checked, with_numbers
 from biogrip.study.source import (
     HOLD,
     KeyPath,
@@ -269,7 +269,7 @@ def _with_instrument(
     usual = {**axis, instrument.read.name: instrument.read.column}
     file = ARRAYS if asked.arrays else str(asked.trace)
     measurement = usual | merged["measurement"] | {"file": file}
-    measurement = schema_of(MeasurementBlock).with_numbers(measurement)
+    measurement = with_numbers(MeasurementBlock, measurement)
     kind = given.get("instrument", instrument.kind)
     block = checked(MeasurementBlock, measurement)[0]
     controlled = instrument.controlled if block is None else block.columns.controlled

@@ -17,6 +17,7 @@ from biogrip.digits import counted
 from biogrip.errors import nearest
 from biogrip.keys import CONFLICT, TWICE, Complaint, adapter, built, kind_of
 from biogrip.physics.instruments import ROTATION
+from biogrip.study.source import values_in
 from biogrip.traces.columns import TIME_UNITS
 
 T = TypeVar("T")
@@ -38,6 +39,7 @@ _UNITS = {
 _ENDS = re.compile(rf".*?_({'|'.join(_UNITS)})")
 _WORDS = {"integer": "an integer", "boolean": "true or false", "string": "text", "array": "a list"}
 _NUMBER = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?")
+_SWITCHES = {"true": True, "false": False}
 # Beyond 2^53 a float does not hold every integer.
 _MOST_COUNTED = 2**53
 
@@ -182,11 +184,7 @@ class Schema:
         return "a block of keys" if block else _WORDS.get(self.get("type"), "a number")
 
     def with_numbers(self, value: Any) -> Any:
-        """Return a copy of a plain value, with text that is a number converted where one is wanted.
-
-        YAML 1.1 takes ``1e-3`` for text, and Snakemake all that is in a block of its ``--config``,
-        ``true`` and ``false``, too. Where text alone is allowed, it stays text.
-        """
+        """Return a copy of a plain value, see `with_numbers`."""
         here = self.option(kind_of(value))
         if isinstance(value, Mapping):
             return {name: here.inside(name).with_numbers(it) for name, it in value.items()}
@@ -194,12 +192,25 @@ class Schema:
             return [here.inside(0).with_numbers(item) for item in value]
         kinds = {option.get("type", "number") for option in (here, *self.options)}
         if isinstance(value, str) and "boolean" in kinds:
-            return {"true": True, "false": False}.get(value.lower(), value)
+            return _SWITCHES.get(value.lower(), value)
         wanted = isinstance(value, str) and kinds & {"number", "integer"}
         if not wanted or not _NUMBER.fullmatch(value.strip()):
             return value
         number = float(value)
         return int(number) if number.is_integer() and abs(number) < _MOST_COUNTED else number
+
+
+def with_numbers(kind: Any, value: Any) -> Any:
+    """Return a config block with text that is a number converted where one is wanted.
+
+    YAML 1.1 takes ``1e-3`` for text, and Snakemake all that is in a block of its ``--config``,
+    ``true`` and ``false``, too. Where text alone is allowed, it stays text.
+    """
+    texts = [it.strip() for _, it in values_in(value) if isinstance(it, str)]
+    if any(_NUMBER.fullmatch(text) or text.lower() in _SWITCHES for text in texts):
+        # Only then, for a schema takes longer to derive than all else of a config.
+        return schema_of(kind).with_numbers(value)
+    return value
 
 
 @cache

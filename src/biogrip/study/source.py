@@ -55,7 +55,7 @@ def snakefile() -> Path:
 
 def values_in(block: Any, above: KeyPath = ()) -> Iterator[tuple[KeyPath, Any]]:
     """Yield all values of a block and of the blocks and lists below, with their paths."""
-    if isinstance(block, list):
+    if isinstance(block, list | tuple):
         block = dict(enumerate(block))
     for key, inner in block.items() if isinstance(block, Mapping) else ():
         yield (*above, key), inner

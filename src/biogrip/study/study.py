@@ -25,7 +25,7 @@ from biogrip.physics.protocol import Course, Phase, join_phases, sample_times
 from biogrip.physics.sample_model import Network, with_fixed
 from biogrip.study.case_blocks import CALIBRATED, OVERRIDABLE, CaseBlock
 from biogrip.study.config import StudyConfig, list_points, point_blocks
-from biogrip.study.messages import checked, schema_of
+from biogrip.study.messages import checked, with_numbers
 from biogrip.study.source import (
     KeyPath,
     Source,
@@ -404,7 +404,7 @@ def load_study(
     what is allowed.
     """
     sources = [*map(read_source, files), *over]
-    study, complaints = checked(StudyConfig, _fill_in(schema_of(StudyConfig).with_numbers(config)))
+    study, complaints = checked(StudyConfig, _fill_in(with_numbers(StudyConfig, config)))
     _refuse(complaints, sources)
     assert study is not None
     study = replace(study, cases={it: study.cases[it] for it in study.only or study.cases})
