@@ -1,4 +1,4 @@
-"""Do the stages that the rule names, functions in modules of `biogrip.stages`."""
+"""Do the stages that the rule names: functions, by their modules in `biogrip`."""
 
 from importlib import import_module
 
@@ -6,5 +6,5 @@ from biogrip.stages.job import logged, run
 
 with logged(snakemake):
     for stage in snakemake.params.stages:
-        module, _, function = stage.partition(".")
-        run(snakemake, getattr(import_module(f"biogrip.stages.{module}"), function))
+        module, _, function = stage.rpartition(".")
+        run(snakemake, getattr(import_module(f"biogrip.{module}"), function))

@@ -3,7 +3,7 @@
 import json
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from io import StringIO
 from pathlib import Path
@@ -167,7 +167,7 @@ def table_of(outcome: Outcome) -> tuple[list[str], list[list[Any]]]:
     ]
 
 
-def join_tables(parts: Sequence[Path], table: Path, rows: int) -> None:
+def join_tables(parts: list[Path], table: Path, rows: int) -> None:
     """Write the rows of several tables of traces as one, as if all had been written at once."""
     # Imported here: loading pandas takes long.
     import pandas as pd

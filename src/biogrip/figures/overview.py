@@ -292,6 +292,12 @@ _RATIO_TICKS = (0.5, 1, 2, 5, 10, 20, 50, 100)
 _WITHOUT_BOUND = "#dddddd"
 
 
+def save_robustness(study: Study, sweep: str, points: Path, figure: list[Path]) -> None:
+    """Draw a sweep, see `draw_robustness`, and write the figure."""
+    with style.styled():
+        style.save(draw_robustness(study, sweep, points), *figure)
+
+
 def draw_robustness(study: Study, name: str, points: Path) -> Figure:
     """Draw shares in the true basin, and errors of the best and the worst determined quantity.
 

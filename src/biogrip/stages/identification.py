@@ -90,10 +90,10 @@ def identify(
 def join(
     case: Case,
     batches: list[Path],
-    history_batches: list[Path],
+    histories: list[Path],
     measurements: list[Path],
     calibrated: list[Path],
-    parameters: Path,
+    identifications: Path,
     history: Path,
 ) -> None:
     """Join the batches of all methods, and add the lowest encodable misfit of each trace.
@@ -118,8 +118,9 @@ def join(
         for seed, of_trace in zip(map(str, traces), posed, strict=True):
             misfit = lowest_encodable(of_trace.residuals.misfit, ranges, np.array(ends[seed]))
             lowest[seed] = f"{misfit:.6e}"
-    write_rows(parameters, (*header, ENCODABLE), ([*row, lowest.get(row[2], "")] for row in rows))
-    write_arrays(history, join_arrays([read_arrays(batch) for batch in history_batches]))
+    joined = ([*row, lowest.get(row[2], "")] for row in rows)
+    write_rows(identifications, (*header, ENCODABLE), joined)
+    write_arrays(history, join_arrays([read_arrays(batch) for batch in histories]))
 
 
 def fit(

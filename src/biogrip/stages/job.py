@@ -168,21 +168,25 @@ def job_settings(job: Any) -> dict[str, Any]:
 
 
 def run(job: Any, stage: Callable[..., None]) -> None:
-    """Do a stage, whose arguments have the names of wildcards and files of a job's rule.
+    """Do a stage, whose arguments have the names of params, wildcards and files of a job's rule.
 
-    ``case`` is the case, and ``seeds`` are those of the batch.
+    ``case`` is the case, ``study`` the study, and ``seeds`` are those of the batch.
     """
-    of_job = (dict(of.items()) for of in (job.wildcards, job.input, job.output))
+    of_job = job.params, job.wildcards, job.input, job.output
     given: dict[str, Any] = {name: it for of in of_job for name, it in of.items()}
+    given["seeds"] = [*seeds_of(given.get("batch", "seeds_0-0"))]
     for name, kind in get_type_hints(stage).items():
-        if kind is Path:
+        if kind is Case:
+            given[name] = job_case(job)
+        elif kind is Study:
+            given[name] = job_study(job)
+        elif kind is Path:
             (given[name],) = paths(given[name])
         elif kind == list[Path]:
             given[name] = paths(given[name])
-    given |= {"case": job_case(job), "seeds": [*seeds_of(given.get("batch", "seeds_0-0"))]}
     stage(**{name: given[name] for name in signature(stage).parameters})
 
 
 def paths(files: Any) -> list[Path]:
     """Return files of Snakemake as paths; one file is a list of one."""
-    return [Path(files)] if isinstance(files, str) else [Path(file) for file in files]
+    return [Path(files)] if isinstance(files, str | Path) else [Path(file) for file in files]

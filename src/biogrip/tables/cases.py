@@ -25,7 +25,7 @@ from biogrip.records.identifications import (
     share_with_limits,
 )
 from biogrip.study.study import Case, Study
-from biogrip.tables.layout import Column, Row, ShownTable
+from biogrip.tables.layout import Column, Row, ShownTable, write
 
 _PERCENTILES = {"p05": 5, "p25": 25, "median": 50, "p75": 75, "p95": 95}
 _COLUMNS = (
@@ -54,6 +54,19 @@ def _columns(near_noise_tolerance: float) -> tuple[Column, ...]:
     share = f"Share {near_noise_words(near_noise_tolerance)}"
     ends = (Column(f"near_noise_{end}", f"95 % {end}", 2) for end in ("from", "to"))
     return (*_COLUMNS, Column("near_noise_share", share, 2), *ends)
+
+
+def write_tables(
+    case: Case,
+    identifications: Path,
+    judged: Path,
+    expected: list[Path],
+    errors: Path,
+    verdicts: Path,
+) -> None:
+    """Write the tables of a case: its errors and its verdicts."""
+    write(errors_of_case(case, identifications), errors)
+    write(verdicts_of_case(case, judged, expected), verdicts)
 
 
 def errors_of_case(case: Case, identifications: Path) -> ShownTable:
@@ -141,7 +154,7 @@ _VERDICT_COLUMNS = (
 )
 
 
-def verdicts(case: Case, measured: Path, expected: list[Path]) -> ShownTable:
+def verdicts_of_case(case: Case, measured: Path, expected: list[Path]) -> ShownTable:
     """List the verdicts on all quantities of a case, and those expected, where there are any."""
     found, others = read_verdicts(measured), [read_verdicts(path) for path in expected]
     foreseen_of = {item["quantity"]: item for item in others[0]["quantities"]} if others else {}

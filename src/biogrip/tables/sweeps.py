@@ -20,7 +20,7 @@ from biogrip.records.identifications import near_noise, near_noise_words, read_b
 from biogrip.records.rows import RowFile
 from biogrip.study.config import AxisBlock, Point
 from biogrip.study.study import Case, Study
-from biogrip.tables.layout import Column, Row, ShownTable
+from biogrip.tables.layout import Column, Row, ShownTable, write
 
 POINTS = RowFile(
     "a sweep",
@@ -168,6 +168,11 @@ _BY_METHOD = {
 }
 # Errors, and the least that is told without noise, where rounding decides how a fit ends.
 _ERRORS, _LEAST_PERCENT = [name for name in _BY_METHOD if "error" in name], 1.0
+
+
+def write_robustness(study: Study, sweep: str, points: Path, table: Path) -> None:
+    """Write the table of a sweep."""
+    write(robustness(study, sweep, points), table)
 
 
 def robustness(study: Study, name: str, points: Path) -> ShownTable:
