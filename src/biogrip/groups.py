@@ -12,11 +12,11 @@ from textwrap import fill
 
 from biogrip import __version__
 from biogrip.command.outputs import COLUMNS as OF_TRACES
-from biogrip.command.outputs import FAILED, LINEAR, METHODS, REASONS, WRITTEN_BY, check_output
+from biogrip.command.outputs import FAILED, LINEAR, METHODS, REASONS, WRITTEN_BY, check_outputs
 from biogrip.command.words import in_sentences, outcome_in_words, paragraph, together
 from biogrip.digits import counted, plain, rounded_numbers, with_limits, with_unit
 from biogrip.errors import BiogripError, nearest
-from biogrip.files import atomic_write, refuse_inputs
+from biogrip.files import atomic_write
 from biogrip.judging.cells import (
     COLUMNS,
     Cell,
@@ -88,9 +88,7 @@ def groups(
         for column, allowed in _complaints(own, made_by, units):
             where = f"{visible(found)}, row {number} ({own['trace']}), {column}"
             raise BiogripError(f"{where}: found '{own[column]}'; allowed is {allowed}.")
-    for path in filter(None, (table, plot)):
-        refuse_inputs([path], [found])
-        check_output(path)
+    check_outputs([*filter(None, (table, plot))], [found])
     if plot is not None and plot.suffix not in (".png", ".pdf"):
         text = f"found {visible(plot)}; allowed is a name that ends with .png or .pdf."
         raise BiogripError(f"--plot: {text}")
@@ -143,7 +141,6 @@ def groups(
 
 
 def _draw(cells: Sequence[Cell], compared: Compared, units: Mapping[str, str], plot: Path) -> None:
-    """Draw cells in one column of a journal."""
     # Imported here: loading Matplotlib takes long.
     from biogrip.figures.cells import ONE_COLUMN_IN, draw_cells
     from biogrip.figures.style import styled
@@ -178,7 +175,6 @@ def _units(header: Sequence[str]) -> dict[str, str]:
 
 
 def _columns(name: str, unit: str) -> dict[str, str]:
-    """Return the columns of a quantity by what they have."""
     numbers = {what: with_unit(f"{name} {what}", unit) for what in _NUMBERS[DETERMINED]}
     return {"verdict": f"{name} verdict"} | numbers
 
@@ -213,7 +209,6 @@ def _complaints(
 
 
 def _number(text: str) -> float:
-    """Return the number in a cell, nan if there is none."""
     try:
         return float(text)
     except ValueError:
@@ -385,5 +380,4 @@ def _tests(cells: Sequence[Cell], names: Sequence[str], by: str, unit: str | Non
 
 
 def _few(names: Sequence[str]) -> str:
-    """Return names, of many their number."""
     return ", ".join(names) if len(names) <= _FEW else f"{len(names)} cells"
