@@ -44,7 +44,6 @@ def _line_of_seed(seed: object, shown: Sequence[int], alpha: float) -> dict[str,
 
 
 def _name_seeds(axes: Axes, seeds: int, first: Iterable[str]) -> None:
-    """Add to the legend what the lines of seeds are."""
     if seeds > 1:
         axes.plot([], [], color=style.ALL_SEEDS, linewidth=0.8, label=seeds_in_words(seeds))
     for words, color in zip(first, style.RUNS, strict=False):
@@ -104,7 +103,6 @@ def draw_convergence(case: Case, identifications: Path, histories: Path) -> Figu
 
 
 def _mark_mutation(axes: Axes, start: int, last: int) -> None:
-    """Mark the generation in which mutation starts, with a label below the curves."""
     axes.axvline(start, color=style.TARGET, linestyle=":", linewidth=0.8)
     before = start > last / 2
     axes.annotate(

@@ -180,7 +180,6 @@ def _readings(count: int) -> dict[str, Any]:
 
 
 def _means(axes: Axes, time_s: Array, residual: Array) -> None:
-    """Draw means of a long trace's residuals, each with its standard error."""
     if len(residual) <= _FEW:
         return
     times, parts = np.array_split(time_s, _PARTS), np.array_split(residual, _PARTS)

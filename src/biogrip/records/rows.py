@@ -41,10 +41,6 @@ AGAIN = "It is damaged: delete it, and the same command makes it again."
 """What to do about a result that is not as it was written."""
 
 
-DIGEST = "digest"
-"""Key of a JSON file, see `write_object`."""
-
-
 @dataclass(frozen=True)
 class RowFile:
     """A kind of CSV file."""
@@ -195,14 +191,14 @@ def join_arrays(several: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
 
 def write_object(path: Path, plain: Mapping[str, Any], made_from: str = "") -> None:
     """Write plain data as JSON, with a digest of them and of what they were made from."""
-    write_text(path, json.dumps({**plain, DIGEST: _digest(plain, made_from)}, indent=1) + "\n")
+    write_text(path, json.dumps({**plain, "digest": _digest(plain, made_from)}, indent=1) + "\n")
 
 
 def read_object(path: Path, kind: str, made_from: str = "") -> dict[str, Any]:
     """Read what `write_object` wrote; a `BiogripError` says that it is something else."""
     try:
         found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        if found.pop(DIGEST) == _digest(found, made_from):
+        if found.pop("digest") == _digest(found, made_from):
             return found
         problem = "its digest is another one"
     except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:

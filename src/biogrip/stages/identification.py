@@ -72,7 +72,6 @@ def identify(
     recorded = read_measurements(measurements, list(seeds))
     experiment = experiment_for(case.experiment, recorded, calibrated).to_identify()
     progress = Progress(f"{case.name}, {method}", len(seeds))
-    whose = case.name, method, experiment.model, experiment.searched, experiment.fixed
     records = []
     for group in groups(seeds):
         traces = [recorded.readings[seed] for seed in group]
@@ -81,7 +80,7 @@ def identify(
         answers = identified(problems, rngs, progress.within)
         for seed, trace, answer in zip(group, traces, answers, strict=True):
             noise = None if recorded.target is None else rms(trace - recorded.target)
-            records.append(Record(*whose, seed, answer, noise))
+            records.append(Record(case.name, method, experiment, seed, answer, noise))
         progress.done(len(group))
     write_identifications(parameters, records)
     write_histories(history, records)

@@ -25,13 +25,11 @@ from biogrip.records.identifications import (
     share_with_limits,
 )
 from biogrip.study.study import Case, Study
-from biogrip.tables.layout import Column, Row, ShownTable, write
+from biogrip.tables.layout import Column, Row, ShownTable, titled, write
 
 _PERCENTILES = {"p05": 5, "p25": 25, "median": 50, "p75": 75, "p95": 95}
 _COLUMNS = (
-    Column("case", "Case"),
-    Column("parameter", "Parameter"),
-    Column("unit", "Unit"),
+    *titled("case", "parameter", "unit"),
     Column("target", "Target", 4),
     Column("paper_identified", "Paper", 4),
     Column("paper_error_percent", "Paper error %", 2),
@@ -138,12 +136,9 @@ def errors(study: Study, identifications: list[Path]) -> ShownTable:
 
 
 _VERDICT_COLUMNS = (
-    Column("case", "Case"),
-    Column("quantity", "Quantity"),
-    Column("unit", "Unit"),
+    *titled("case", "quantity", "unit"),
     Column("target", "Target", 4),
-    Column("fit", "Fit"),
-    Column("verdict", "Verdict"),
+    *titled("fit", "verdict"),
     Column("value", "Estimate", 3),
     Column("low", "{percent} from", 3),
     Column("high", "{percent} to", 3),

@@ -49,6 +49,11 @@ class Column:
     """Significant digits of numbers in print."""
 
 
+def titled(*names: str) -> tuple[Column, ...]:
+    """Return columns whose headings are their names."""
+    return tuple(Column(name, name.capitalize()) for name in names)
+
+
 @dataclass(frozen=True)
 class ShownTable:
     """A table with caption, columns and rows."""

@@ -59,7 +59,6 @@ def _rows(
     files: Mapping[tuple[str, str], list[Path]],
     calibrations: Mapping[str, list[Path]],
 ) -> Iterator[tuple[str | int, ...]]:
-    """Yield a row for every point of a case, method and quantity."""
     true = study.cases[points[0].case].parameters
     bounds = {}
     for point in points:
@@ -88,22 +87,18 @@ def _judged(
     heads: list[str],
     near: float,
 ) -> Iterator[tuple[str | int, ...]]:
-    """Yield what one method finds at a point, for every quantity."""
     searched = point.experiment.searched.parameters
-    members = {q.label: [searched[index] for index in q.members] for q, _ in bounds}
-    truths = {label: sum(true[p.name] for p in of) for label, of in members.items()}
-    values = {
-        label: found[[p.column for p in of]].sum(axis=1).to_numpy(float)
-        for label, of in members.items()
-    }
-    inside = np.ones(len(found), dtype=bool)
+    errors, inside = {}, np.ones(len(found), dtype=bool)
     for q, percent in bounds:
+        members = [searched[index] for index in q.members]
+        truth = sum(true[p.name] for p in members)
+        values = found[[p.column for p in members]].sum(axis=1).to_numpy(float)
+        errors[q.label] = 100 * np.abs(values - truth) / (truth or np.nan)
         if q.label in heads:
-            inside &= in_basin(values[q.label], truths[q.label], percent / 100)
+            inside &= in_basin(values, truth, percent / 100)
     for q, percent in bounds:
-        truth = truths[q.label]
-        errors = 100 * np.abs(values[q.label] - truth) / (truth or np.nan)
-        medians = [np.median(some) if len(some) else np.nan for some in (errors, errors[inside])]
+        every = errors[q.label]
+        medians = [np.median(some) if len(some) else np.nan for some in (every, every[inside])]
         share = float(np.mean(inside)) if heads else np.nan
         numbers = (near, share, *medians, percent)
         yield q.label, len(found), *("" if np.isnan(it) else f"{it:.6g}" for it in numbers)
