@@ -36,7 +36,7 @@ from biogrip.physics.unilateral import unilateral_response
 from biogrip.records.traces import as_written
 from biogrip.stages.job import job_study, logged
 from biogrip.study.study import Case, Study
-from biogrip.tables.layout import Column, Row, ShownTable, write
+from biogrip.tables.layout import Column, Row, ShownTable, titled, write
 
 if TYPE_CHECKING:
     snakemake: Any
@@ -245,8 +245,7 @@ def _mechanics_of(case: Case) -> list[Row]:
 _LEFT_OUT_COLUMNS = (
     Column("effect", "Left out"),
     Column("size", "Size", 2),
-    Column("unit", "Unit"),
-    Column("beside", "Beside"),
+    *titled("unit", "beside"),
     Column("beside_size", "which is", 2),
     Column("share_percent", "Share (%)", 2),
     Column("remark", "Remark"),
@@ -306,9 +305,7 @@ _LARGEST_PERCENT = 1000.0
 _COLUMNS = (
     Column("case", "Case"),
     Column("lost_at_s", "Contact lost at (s)"),
-    Column("quantity", "Quantity"),
-    Column("unit", "Unit"),
-    Column("target", "Target"),
+    *titled("quantity", "unit", "target"),
     Column("held", "Held throughout"),
     Column("let_go", "Let go"),
     Column("error_percent", "Error (%)"),

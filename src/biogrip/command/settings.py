@@ -530,20 +530,18 @@ def _column_problems(
     """Find names that stand twice or are those of results, and what looks like a setting."""
     for number, name in enumerate(header):
         cells = [cell for _, row in rows for cell in row[number : number + 1] if cell]
-        text = ""
+        where = place(path, 1, name)
         if name and name in header[:number]:
-            text = "stands twice; allowed is each name once."
+            yield f"{where}: stands twice; allowed is each name once."
         elif name not in used and (name in COLUMNS or _OF_RESULTS.fullmatch(name)):
-            text = "is a column of the results; allowed is another name."
+            yield f"{where}: is a column of the results; allowed is another name."
         elif name and cells and "." not in name and name not in used:
             meant = _meant(name, cells)
             if meant and meant not in map(_plain, header):
-                text = (
-                    f"looks like a setting and is none; allowed is '{meant}' for a column that "
-                    "sets it, in SI units, or a name unlike a setting's."
+                yield (
+                    f"{where}: looks like a setting and is none; allowed is '{meant}' for a column "
+                    "that sets it, in SI units, or a name unlike a setting's."
                 )
-        if text:
-            yield f"{place(path, 1, name)}: {text}"
 
 
 def load_in_words(trace: Trace, case: Case, given: Mapping[str, Any]) -> str:

@@ -1,6 +1,6 @@
 """Runs of the methods: Figures 8 and 10 over generations, where all runs end, and their errors."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from statistics import NormalDist
 from typing import Any
@@ -37,9 +37,10 @@ _TICKS = (0, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000)
 _LOWEST = 1e-3
 
 
-def _line_of_seed(seed: object, shown: Sequence[int], alpha: float) -> dict[str, Any]:
-    if seed in shown:
-        return {"color": style.RUNS[shown.index(seed)], "linewidth": 1.5, "zorder": 3}
+def _line_of_seed(seed: object, first: Mapping[str, int], alpha: float) -> dict[str, Any]:
+    for own, color in zip(first.values(), style.RUNS, strict=False):
+        if seed == own:
+            return {"color": color, "linewidth": 1.5, "zorder": 3}
     return {"color": style.ALL_SEEDS, "linewidth": 0.4, "alpha": alpha}
 
 
@@ -52,24 +53,24 @@ def _name_seeds(axes: Axes, seeds: int, first: Iterable[str]) -> None:
 
 def _runs(
     case: Case, identifications: Path, histories: Path, values: Sequence[str]
-) -> tuple[pd.DataFrame, list[str], list[int], pd.DataFrame]:
-    """Return runs of the shown method, names and seeds of the first in each basin, and histories.
+) -> tuple[pd.DataFrame, dict[str, int], pd.DataFrame]:
+    """Return runs of the shown method, the seed of the first in each basin by name, and histories.
 
     Histories are those of the seeds drawn individually and of these first ones.
     """
     method = case.study.shown_method.name
     found = read_identifications(identifications, case, method)
-    first = first_of_basins(found, case.study.near_noise_tolerance)
-    shown = [int(run["seed"]) for run in first.values()]
+    runs = first_of_basins(found, case.study.near_noise_tolerance)
+    first = {words: int(run["seed"]) for words, run in runs.items()}
     history = read_histories(histories, method, values)
-    drawn = history["seed"].isin({*range(SHOWN_SEEDS), *shown})
-    return found, list(first), shown, history[drawn]
+    drawn = history["seed"].isin({*range(SHOWN_SEEDS), *first.values()})
+    return found, first, history[drawn]
 
 
 def draw_convergence(case: Case, identifications: Path, histories: Path) -> Figure:
     """Draw each seed's excess of the misfit over its noise, highlighting a run of each basin."""
     method, tolerance = case.study.shown_method, case.study.near_noise_tolerance
-    found, first, shown, history = _runs(case, identifications, histories, ["best_misfit"])
+    found, first, history = _runs(case, identifications, histories, ["best_misfit"])
     noise = found.set_index("seed")["noise_rms"]
     noisy = bool((noise > 0).all())
     unit = noise if noisy else pd.Series(found["misfit"].min(), index=noise.index)
@@ -77,7 +78,7 @@ def draw_convergence(case: Case, identifications: Path, histories: Path) -> Figu
     axes = drawn.subplots()
     for seed, rows in history.groupby("seed"):
         excess = 100 * (rows["best_misfit"] / unit[seed] - 1)
-        axes.plot(rows["generation"], excess, **_line_of_seed(seed, shown, 0.7))
+        axes.plot(rows["generation"], excess, **_line_of_seed(seed, first, 0.7))
     _name_seeds(axes, len(found), first)
     label = "noise in the trace" if noisy else "lowest misfit"
     axes.axhline(0, color=style.TARGET, linestyle="--", linewidth=0.8, label=label)
@@ -121,12 +122,13 @@ def draw_evolution(case: Case, identifications: Path, histories: Path) -> Figure
     """Draw every parameter over generations for all seeds, highlighting a run of each basin."""
     parameters, identified = case.sample.model.parameters, case.published.identified
     columns = [parameter.column for parameter in parameters]
-    found, first, shown, history = _runs(case, identifications, histories, columns)
-    drawn = style.figure(style.COLUMN_IN, 1.2 + 1.5 * (rows := -(-len(parameters) // 2)))
-    grid = drawn.subplots(rows, 2, sharex=True).ravel()
+    found, first, history = _runs(case, identifications, histories, columns)
+    down = -(-len(parameters) // 2)
+    drawn = style.figure(style.COLUMN_IN, 1.2 + 1.5 * down)
+    grid = drawn.subplots(down, 2, sharex=True).ravel()
     for axes, parameter in zip(grid, parameters, strict=False):
         for seed, rows in history.groupby("seed"):
-            look = _line_of_seed(seed, shown, 0.6)
+            look = _line_of_seed(seed, first, 0.6)
             axes.step(rows["generation"], rows[parameter.column], where="post", **look)
         target = case.parameters.get(parameter.name, 0)
         if target > 0:
