@@ -194,7 +194,7 @@ def test_of_dampers_that_trade_the_sum_is_ten() -> None:
         assert told[0] == pytest.approx(value)
         assert told[1] < told[0] < told[2]
     assert cases.value_in_case(STUDY.cases["liquid_drop_1"], ["alpha"]) is None
-    assert cases.interval_of_value(0.23) == pytest.approx((0.225, 0.24))
+    assert cases.interval_of(0.23, None, None) == pytest.approx((0.225, 0.24))
 
 
 def found(misfit: list[float], noise: list[float | None]) -> pd.DataFrame:

@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 
 from biogrip.arrays import Array
+from biogrip.digits import significant
 from biogrip.errors import BiogripError
 from biogrip.fit.least_squares import identify_many
 from biogrip.physics import gripper as actuator
@@ -33,7 +34,6 @@ from biogrip.physics.simulation import (
     simulated_response,
 )
 from biogrip.physics.unilateral import unilateral_response
-from biogrip.records.traces import as_written
 from biogrip.stages.job import job_study, logged
 from biogrip.study.study import Case, Study
 from biogrip.tables.layout import Column, Row, ShownTable, titled, write
@@ -338,8 +338,9 @@ def _loss_of(study_seed: int, case: Case) -> list[Row]:
     free = unilateral_response(*device, time_s)
     if not free.parted_s:
         return []
-    held = as_written(simulated_response(*device, time_s, nonlinear=False)[0])
-    let_go = as_written(free.rotation[0])
+    # As the targets of a case are written.
+    read = simulated_response(*device, time_s, nonlinear=False)[0], free.rotation[0]
+    held, let_go = (significant(each, 9) for each in read)
     rngs = [
         stream(study_seed, case.name, seed, "noise") for seed in range(min(case.seeds, _MOST_SEEDS))
     ]

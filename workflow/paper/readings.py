@@ -23,7 +23,7 @@ from biogrip.stages.job import job_study, logged, paths
 from biogrip.study.case_blocks import CaseBlock
 from biogrip.study.source import overlaid
 from biogrip.study.study import Study
-from biogrip.tables.cases import interval_of_value, value_in_case
+from biogrip.tables.cases import interval_of, value_in_case
 from biogrip.tables.layout import Column, Row, ShownTable, titled, write
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def printable(study: Study, reading: str) -> dict[str, int]:
         ranges = built(CaseBlock, overlaid(case.plain, changes)).search_range
         for name, printed in case.published.identified.items():
             held = getattr(ranges, name).values
-            ends = {"exactly": (printed, printed), "rounded": interval_of_value(printed)}
+            ends = {"exactly": (printed, printed), "rounded": interval_of(printed, None, None)}
             ends["with_error"] = (value_in_case(case, [name]) or ends["rounded"])[-2:]
             counts["values"] += 1
             for how, (low, high) in ends.items():

@@ -190,20 +190,13 @@ def target_of(quantity: str, parameters: Mapping[str, float]) -> float | None:
     return sum(parameters[name] for name in names) if set(names) <= set(parameters) else None
 
 
-Interval = tuple[float, float]
-"""Lowest and highest number."""
+def interval_of(
+    printed: float, target: float | None, error_percent: str | None
+) -> tuple[float, float]:
+    """Return the ends of the numbers that are printed so with this error, rounded or cut off.
 
-
-def interval_of_value(printed: float) -> Interval:
-    """Return the numbers that are printed so, rounded or cut off after the last digit."""
-    (low, _), (_, high) = _ways(Decimal(f"{printed:.15g}"))
-    return float(low), float(high)
-
-
-def interval_of(printed: float, target: float | None, error_percent: str | None) -> Interval:
-    """Return the numbers that are printed so with this error, each rounded or cut off.
-
-    An error that is no number, or that no such number has, says nothing.
+    Without an error, or with one that is no number or that no such number has, the value alone
+    counts.
     """
     values = _ways(Decimal(f"{printed:.15g}"))
     found = []
