@@ -144,23 +144,15 @@ def require_rows(
     raise BiogripError(f"{path}: found {len(found)} rows, wanted {len(known)}{text}. {AGAIN}")
 
 
-def read_rows(path: Path, columns: Sequence[str] | None = None) -> list[list[str]]:
-    """Read the header, which may have to be given columns, and all rows as text.
-
-    Without columns the file is a user's, see `whole`.
-    """
-    text = whole(path, again="" if columns is None else f" {AGAIN}")
-    rows = [[*map(as_it_was, row)] for row in csv.reader(StringIO(text, newline=""))]
-    if columns is not None and rows[0] != list(columns):
-        found, wanted = ",".join(rows[0]), ",".join(columns)
-        raise BiogripError(f"{path}, line 1: found {found}; wanted {wanted}.")
-    return rows
+def read_rows(path: Path, again: str = "") -> list[list[str]]:
+    """Read the header and all rows of a file, by default a user's, as text, see `whole`."""
+    text = whole(path, again=again)
+    return [[*map(as_it_was, row)] for row in csv.reader(StringIO(text, newline=""))]
 
 
 def read_table(path: Path) -> list[dict[str, str]]:
     """Read the rows of a table as text by column."""
-    whole(path)
-    header, *rows = read_rows(path)
+    header, *rows = read_rows(path, f" {AGAIN}")
     return [dict(zip(header, row, strict=True)) for row in rows]
 
 

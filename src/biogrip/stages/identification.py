@@ -41,7 +41,7 @@ from biogrip.records.identifications import (
 from biogrip.records.rows import (
     join_arrays,
     read_arrays,
-    read_rows,
+    read_table,
     write_arrays,
     write_object,
     write_rows,
@@ -99,14 +99,13 @@ def join(
 
     It is looked for around the end of every run, since these surround the continuous optimum.
     """
-    header = columns(case.sample.model)
     for batch in batches:
         read_batch(batch, case)
-    rows = [row for batch in batches for row in read_rows(batch, header)[1:]]
+    rows = [row for batch in batches for row in read_table(batch)]
     searched = case.experiment.searched.parameters
     ends = defaultdict(list)
     for row in rows:
-        ends[row[2]].append([float(row[header.index(p.column)]) for p in searched])
+        ends[row["seed"]].append([float(row[p.column]) for p in searched])
     lowest: dict[str, str] = {}
     for file in measurements:
         recorded = read_measurements(file)
@@ -117,7 +116,8 @@ def join(
         for seed, of_trace in zip(map(str, traces), posed, strict=True):
             misfit = lowest_encodable(of_trace.residuals.misfit, ranges, np.array(ends[seed]))
             lowest[seed] = f"{misfit:.6e}"
-    joined = ([*row, lowest.get(row[2], "")] for row in rows)
+    header = columns(case.sample.model)
+    joined = ([*map(row.get, header), lowest.get(row["seed"], "")] for row in rows)
     write_rows(identifications, (*header, ENCODABLE), joined)
     write_arrays(history, join_arrays([read_arrays(batch) for batch in histories]))
 
