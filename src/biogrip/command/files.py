@@ -12,7 +12,6 @@ from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
-from importlib.metadata import version
 from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
@@ -370,10 +369,7 @@ def data_of(
             for name in ("gripper", "protocol")
             if case.instrument.has_jaws and not {*(given.get(name) or ())} - {"uncertainty"}
         ],
-        "versions": {
-            "biogrip": __version__,
-            **{name: version(name) for name in ("numpy", "scipy")},
-        },
+        "versions": {name: it for name, it in software().items() if name != "source"},
     }
 
 
