@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from statistics import NormalDist
+from string import ascii_letters
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,6 @@ from biogrip.arrays import Array
 from biogrip.digits import with_unit
 from biogrip.figures import style
 from biogrip.figures.fit import SHOWN_SEEDS, first_of_basins, seeds_in_words
-from biogrip.judging.quantities import Quantity
 from biogrip.judging.verdicts import DETERMINED
 from biogrip.records.identifications import (
     ENCODABLE,
@@ -215,7 +215,8 @@ def draw_scatter(
         if {p.name for p in names} <= {*(printed := case.published.identified)}:
             ratio = np.clip(sum(printed[p.name] for p in names) / value, *axes.get_ylim())
             axes.axhline(ratio, color=style.PAPER, linewidth=1.2, linestyle=(0, (4, 2)))
-        style.panel(axes, "abcdefghijklmnopqrstuvwxyz"[index], _title(quantity, known, verdict), 60)
+        said = f"{100 * known:.2g} %" if np.isfinite(known) else verdict.split(" above")[0]
+        style.panel(axes, ascii_letters[index], f"{quantity.symbol}: {said}", 60)
         if index == 0:
             axes.set_ylabel("identified / target")
     _legend(drawn, case, list(found["method"].unique()), found["seed"].nunique())
@@ -258,11 +259,6 @@ def _quantity(
         axes.yaxis.set_major_locator(MaxNLocator(5))
     axes.set(ylim=(bottom, top), xlim=(-0.6, len(names) - 0.4))
     axes.set_xticks([])
-
-
-def _title(quantity: Quantity, limit: float, verdict: str) -> str:
-    known = f"{100 * limit:.2g} %" if np.isfinite(limit) else verdict.split(" above")[0]
-    return f"{quantity.symbol}: {known}"
 
 
 def _legend(drawn: Figure, case: Case, methods: list[str], seeds: int) -> None:

@@ -5,6 +5,7 @@
 
 import math
 from collections.abc import Iterator, Mapping
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ from biogrip.physics.noise import rms
 from biogrip.physics.simulation import simulated_response
 from biogrip.records.identifications import near_noise, near_noise_words, read_batch
 from biogrip.records.rows import RowFile
-from biogrip.study.config import AxisBlock, Point
+from biogrip.study.config import AxisBlock
 from biogrip.study.study import Case, Study
 from biogrip.tables.layout import Column, Row, ShownTable, write
 
@@ -49,34 +50,25 @@ def judge(
         files.setdefault((path.parts[-3], path.parts[-2]), []).append(path)
     calibrations = {path.stem: [path] for path in calibrated}
     block = study.config.sweeps[sweep]
-    each = (_rows(study, block.points(sweep, case), files, calibrations) for case in block.cases)
-    POINTS.write(points, (row for rows in each for row in rows))
-
-
-def _rows(
-    study: Study,
-    points: list[Point],
-    files: Mapping[tuple[str, str], list[Path]],
-    calibrations: Mapping[str, list[Path]],
-) -> Iterator[tuple[str | int, ...]]:
-    true = study.cases[points[0].case].parameters
-    bounds = {}
-    for point in points:
-        case = study.points[point.name]
-        problem = case.experiment.calibrated(calibrations.get(point.name, []))
-        bounds[point.name] = bounds_percent(problem, case.noise, true, case.times_s)
-    heads = headlines([(q.label, percent) for found in bounds.values() for q, percent in found])
-    for point in points:
-        case = study.points[point.name]
-        for method in study.config.methods:
-            batches = files[point.name, method]
-            found = pd.concat([read_batch(path, case) for path in batches])
+    rows: list[tuple[str | int, ...]] = []
+    for name in block.cases:
+        true, grid, bounds = study.cases[name].parameters, block.points(sweep, name), {}
+        for point in grid:
+            case = study.points[point.name]
+            problem = case.experiment.calibrated(calibrations.get(point.name, []))
+            bounds[point.name] = bounds_percent(problem, case.noise, true, case.times_s)
+        heads = headlines([(q.label, percent) for found in bounds.values() for q, percent in found])
+        for point, method in product(grid, study.config.methods):
+            case = study.points[point.name]
+            found = pd.concat([read_batch(path, case) for path in files[point.name, method]])
             if case.noise.absent:
                 # Without noise, the misfit of the true values rounded to the genes' digits.
                 found = found.assign(noise_rms=_resolution(case, true))
             near = float(np.mean(near_noise(found, study.near_noise_tolerance)))
-            for judged in _judged(case, true, found, bounds[point.name], heads, near):
-                yield point.name, point.row.shown, point.column.shown, method, *judged
+            head = point.name, point.row.shown, point.column.shown, method
+            judged = _judged(case, true, found, bounds[point.name], heads, near)
+            rows += ((*head, *own) for own in judged)
+    POINTS.write(points, rows)
 
 
 def _judged(
