@@ -2,9 +2,10 @@
 
 from importlib import import_module
 
-from biogrip.stages.job import logged, run
+from biogrip.stages.job import arguments, logged
 
 with logged(snakemake):
     for stage in snakemake.params.stages:
-        module, _, function = stage.rpartition(".")
-        run(snakemake, getattr(import_module(f"biogrip.{module}"), function))
+        module, _, name = stage.rpartition(".")
+        function = getattr(import_module(f"biogrip.{module}"), name)
+        function(**arguments(snakemake, function))

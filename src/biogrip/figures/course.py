@@ -52,7 +52,7 @@ def _name_seeds(axes: Axes, seeds: int, first: Iterable[str]) -> None:
 
 
 def _runs(
-    case: Case, identifications: Path, histories: Path, values: Sequence[str]
+    case: Case, identifications: Path, history: Path, values: Sequence[str]
 ) -> tuple[pd.DataFrame, dict[str, int], pd.DataFrame]:
     """Return runs of the shown method, the seed of the first in each basin by name, and histories.
 
@@ -62,27 +62,27 @@ def _runs(
     found = read_identifications(identifications, case, method)
     runs = first_of_basins(found, case.study.near_noise_tolerance)
     first = {words: int(run["seed"]) for words, run in runs.items()}
-    history = read_histories(histories, method, values)
-    drawn = history["seed"].isin({*range(SHOWN_SEEDS), *first.values()})
-    return found, first, history[drawn]
+    histories = read_histories(history, method, values)
+    drawn = histories["seed"].isin({*range(SHOWN_SEEDS), *first.values()})
+    return found, first, histories[drawn]
 
 
-def draw_convergence(case: Case, identifications: Path, histories: Path) -> Figure:
+def draw_convergence(case: Case, identifications: Path, history: Path) -> Figure:
     """Draw each seed's excess of the misfit over its noise, highlighting a run of each basin."""
     method, tolerance = case.study.shown_method, case.study.near_noise_tolerance
-    found, first, history = _runs(case, identifications, histories, ["best_misfit"])
+    found, first, histories = _runs(case, identifications, history, ["best_misfit"])
     noise = found.set_index("seed")["noise_rms"]
     noisy = bool((noise > 0).all())
     unit = noise if noisy else pd.Series(found["misfit"].min(), index=noise.index)
     drawn = style.figure(style.COLUMN_IN, 2.9)
     axes = drawn.subplots()
-    for seed, rows in history.groupby("seed"):
+    for seed, rows in histories.groupby("seed"):
         excess = 100 * (rows["best_misfit"] / unit[seed] - 1)
         axes.plot(rows["generation"], excess, **_line_of_seed(seed, first, 0.7))
     _name_seeds(axes, len(found), first)
     label = "noise in the trace" if noisy else "lowest misfit"
     axes.axhline(0, color=style.TARGET, linestyle="--", linewidth=0.8, label=label)
-    last = int(history["generation"].max())
+    last = int(histories["generation"].max())
     if "genetic_algorithm" in method.blocks:
         mutation_start = case.block.genetic_algorithm.mutation_start
         if mutation_start <= last:
@@ -118,16 +118,16 @@ def _mark_mutation(axes: Axes, start: int, last: int) -> None:
     )
 
 
-def draw_evolution(case: Case, identifications: Path, histories: Path) -> Figure:
+def draw_evolution(case: Case, identifications: Path, history: Path) -> Figure:
     """Draw every parameter over generations for all seeds, highlighting a run of each basin."""
     parameters, identified = case.sample.model.parameters, case.published.identified
     columns = [parameter.column for parameter in parameters]
-    found, first, history = _runs(case, identifications, histories, columns)
+    found, first, histories = _runs(case, identifications, history, columns)
     down = -(-len(parameters) // 2)
     drawn = style.figure(style.COLUMN_IN, 1.2 + 1.5 * down)
     grid = drawn.subplots(down, 2, sharex=True).ravel()
     for axes, parameter in zip(grid, parameters, strict=False):
-        for seed, rows in history.groupby("seed"):
+        for seed, rows in histories.groupby("seed"):
             look = _line_of_seed(seed, first, 0.6)
             axes.step(rows["generation"], rows[parameter.column], where="post", **look)
         target = case.parameters.get(parameter.name, 0)
@@ -135,10 +135,10 @@ def draw_evolution(case: Case, identifications: Path, histories: Path) -> Figure
             axes.axhline(target, color=style.TARGET, linestyle="--")
         if parameter.name in identified:
             axes.axhline(identified[parameter.name], color=style.PAPER, linestyle=":")
-        if np.any(history[parameter.column] > 0):
+        if np.any(histories[parameter.column] > 0):
             axes.set_yscale("log")
         axes.set_ylabel(with_unit(parameter.symbol, parameter.unit))
-        axes.set_xlim(0, history["generation"].max())
+        axes.set_xlim(0, histories["generation"].max())
     for axes in grid[len(parameters) :]:
         axes.set_axis_off()
     for axes in grid[len(parameters) - 2 : len(parameters)]:

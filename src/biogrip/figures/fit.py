@@ -138,10 +138,10 @@ def draw_fits(
 
 
 def draw_judged_fit(
-    case: Case, verdicts: Path, measurements: Path, calibrated: list[Path]
+    case: Case, verdicts: Path, measurements: list[Path], calibrated: list[Path]
 ) -> Figure:
     """Draw the judged trace of a case and its best fit."""
-    fit = judged_fit(case, read_verdicts(verdicts), measurements, calibrated)
+    fit = judged_fit(case, read_verdicts(verdicts), measurements[0], calibrated)
     trace = "recorded trace" if case.recorded else f"seed {TRACE}"
     return draw_fit({f"best fit ({trace})": fit}, case.title, case.published.axis_rad)
 
