@@ -5,7 +5,7 @@ import json
 import re
 import textwrap
 from collections.abc import Callable, Iterator
-from contextlib import redirect_stdout, suppress
+from contextlib import redirect_stderr, redirect_stdout, suppress
 from functools import cache
 from io import StringIO
 from pathlib import Path
@@ -28,7 +28,6 @@ from biogrip.physics.noise import add_noise, stream
 from biogrip.physics.simulation import simulated_response
 from biogrip.records.identifications import share_in_words
 from biogrip.records.rows import read_table
-from biogrip.terminal import QUIET
 from tests.helpers.default import STUDY, study_of
 from tests.helpers.key_reference import file_schema, reference
 from tests.helpers.places import EXAMPLE, EXAMPLE_TRUTH, ROOT
@@ -256,8 +255,8 @@ def _range(values: "pd.Series[float]", how: str, unit: str = "") -> str:
 @cache
 def example(*options: str) -> tuple[str, dict[str, Any]]:
     """What `biogrip identify` prints of the example, under options of the command, and its JSON."""
-    quiet = mock.patch.dict("os.environ", {QUIET: "1"})
-    with TemporaryDirectory() as folder, redirect_stdout(StringIO()) as said, quiet:
+    unheard = redirect_stderr(StringIO())
+    with TemporaryDirectory() as folder, redirect_stdout(StringIO()) as said, unheard:
         main(["identify", str(EXAMPLE), "--output", f"{folder}/found.json", *options])
         return said.getvalue(), json.loads(Path(folder, "found.json").read_text(encoding="utf-8"))
 

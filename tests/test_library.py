@@ -112,7 +112,7 @@ def test_a_trace_is_identified_again_by_a_model_s_usual_name_and_drawn_by_its_cl
 
 @pytest.mark.parametrize(("name", "branches"), [("Prony3", 3), ("prony_1", 1)])
 def test_a_prony_series_has_no_damper_beside_its_branches(name: str, branches: int) -> None:
-    case = case_of(Asked(EXAMPLE, None, (Setting("--model", ("sample", "model"), name),)))
+    case, _ = case_of(Asked(EXAMPLE, None, (Setting("--model", ("sample", "model"), name),)))
     assert (case.sample.name, case.sample.branches) == ("generalized_maxwell", branches)
     assert case.fixed == {"c_p": 0.0}
 

@@ -26,7 +26,6 @@ from biogrip.judging.doubts import REJECTION
 from biogrip.judging.onset import notes_on_start
 from biogrip.physics.models import CANDIDATES
 from biogrip.study.source import HOLD
-from biogrip.terminal import QUIET
 from tests.generated_docs import example
 from tests.helpers.identified import FEW, by_quantity, identified, identify, told, write_drop
 from tests.helpers.places import EXAMPLE, EXAMPLE_TRUTH
@@ -107,14 +106,16 @@ def test_options_are_keys_of_the_config_and_the_last_one_counts(tmp_path: Path) 
         (same := tmp_path / "same.yaml").write_text(f"measurement: {{{config}}}")
         given = _parser().parse_args(["identify", "a.csv", *options.split(" ")]).settings
         model = Setting("--model", ("sample", "model"), "generalized_maxwell_2")
-        by_options = case_of(Asked(EXAMPLE, None, (model, *given)))
-        assert by_options.block == case_of(Asked(EXAMPLE, same, (model,))).block
+        by_options, _ = case_of(Asked(EXAMPLE, None, (model, *given)))
+        assert by_options.block == case_of(Asked(EXAMPLE, same, (model,)))[0].block
         assert by_options.sample.candidate == "generalized_maxwell_2"
+    same.write_text("measurement: {start_s: 3.0, strain: e}")
+    given = _parser().parse_args(["identify", "a.csv", "--start=fit", "--reading=a"]).settings
+    measured = case_of(Asked(EXAMPLE, same, tuple(given)))[0].block.measurement
+    assert (measured.fit_start, measured.readings) == (True, ["rotation"])
 
 
-def test_what_is_recognised_in_an_export_is_said_unless_quiet(
-    tmp_path: Path, few: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_is_recognised_in_an_export_is_said(tmp_path: Path, few: Path) -> None:
     trace = Path(shutil.copy(EXPORT, tmp_path / "gel.csv"))
     options = "--time Time --start 24 --model maxwell --set measurement.block=3 --no-compare"
     reading = "--reading", "modulus=Relaxation Modulus"
@@ -124,8 +125,6 @@ def test_what_is_recognised_in_an_export_is_said_unless_quiet(
     assert "gel.csv is read as\n  encoding     UTF-16\n  separator    tabs\n" in said
     assert "\n  modulus      Relaxation Modulus, in kPa\n" in said
     assert json.loads((tmp_path / "gel.identified.json").read_text())["read_as"]["block"] == 3
-    monkeypatch.setenv(QUIET, "1")
-    assert identify(trace, *given)[2] == ""
 
 
 def test_what_was_held_is_stated_once(tmp_path: Path) -> None:

@@ -71,7 +71,7 @@ def test_a_row_says_what_options_and_config_say_of_one_trace(here: Path) -> None
     (here / "lab.yaml").write_text(lab)
     time = Setting("--time", ("measurement", "time"), "t_s")
     asked = Asked(other.trace, here / "lab.yaml", (time,))
-    assert case_of(other).block == case_of(asked).block
+    assert case_of(other)[0].block == case_of(asked)[0].block
 
 
 def test_a_trace_may_stand_beside_a_table_that_does_not_name_it(here: Path) -> None:

@@ -133,7 +133,6 @@ class _Set(argparse.Action):
     def __call__(
         self, parser: Any, namespace: argparse.Namespace, values: Any, option: str | None = None
     ) -> None:
-        """Append the option with path and value; one that takes no value is a switch."""
         path, value = tuple(self.dest.split(".")), values
         if isinstance(values, tuple):
             path, value = values
@@ -143,7 +142,6 @@ class _Set(argparse.Action):
 
 
 def _add_settings(parser: Any, *, outputs: bool = False) -> None:
-    """Add traces, and options that say what they are of."""
     parser.set_defaults(settings=[])
     parser.lists_models = True
     parser.add_argument(

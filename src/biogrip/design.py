@@ -17,10 +17,10 @@ import yaml
 
 from biogrip import __version__
 from biogrip.arrays import Array, BoolArray, IntArray
-from biogrip.command.outputs import WRITTEN_BY, check_output
+from biogrip.command.outputs import WRITTEN_BY, check_outputs
 from biogrip.digits import with_unit
 from biogrip.errors import BiogripError, nearest
-from biogrip.files import refuse_inputs, write_text
+from biogrip.files import write_text
 from biogrip.physics.modes import linear_responses
 from biogrip.physics.noise import standard_deviation, without
 from biogrip.physics.protocol import Phase, hold, join_phases, largest_load, sample_times
@@ -160,8 +160,7 @@ def design(
     A `BiogripError` says what cannot be used, or that no train tells anything.
     """
     output = output or config.with_stem(f"{config.stem}_designed")
-    refuse_inputs([output], [config])
-    check_output(output)
+    check_outputs([output], [config])
     files = [default_config(), config]
     study = load_study(read_configs(files), files)
     cases, block = list(study.cases.values()), study.config.design

@@ -104,7 +104,6 @@ def instant(time_s: float, low_s: float, high_s: float) -> str:
 
 
 def _power(value: float) -> int:
-    """Return the power of ten of a number's first digit."""
     return math.floor(math.log10(value))
 
 

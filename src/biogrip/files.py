@@ -2,7 +2,7 @@
 
 import hashlib
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 from importlib.metadata import version
@@ -71,12 +71,3 @@ def software() -> dict[str, str]:
         **versions,
         "source": hashlib.sha256(source.encode()).hexdigest()[:12],
     }
-
-
-def refuse_inputs(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
-    """Refuse outputs that are also inputs, under any name: a `BiogripError` names the first."""
-    # Path.exists raises for invalid paths; os.path.exists returns False.
-    read = [path for path in inputs if os.path.exists(path)]
-    for output in outputs:
-        if os.path.exists(output) and any(output.samefile(path) for path in read):
-            raise BiogripError(f"{visible(output)}: is read; allowed is another file to write.")

@@ -6,17 +6,18 @@
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from math import inf, isnan, nan
+from math import inf, nan
 from pathlib import Path
 from textwrap import fill
+from typing import NoReturn
 
 from biogrip import __version__
 from biogrip.command.outputs import COLUMNS as OF_TRACES
-from biogrip.command.outputs import FAILED, LINEAR, METHODS, REASONS, WRITTEN_BY, check_output
+from biogrip.command.outputs import FAILED, LINEAR, METHODS, REASONS, WRITTEN_BY, check_outputs
 from biogrip.command.words import in_sentences, outcome_in_words, paragraph, together
 from biogrip.digits import counted, plain, rounded_numbers, with_limits, with_unit
 from biogrip.errors import BiogripError, nearest
-from biogrip.files import atomic_write, refuse_inputs
+from biogrip.files import atomic_write
 from biogrip.judging.cells import (
     COLUMNS,
     Cell,
@@ -47,6 +48,7 @@ _NUMBERS: dict[str, tuple[str, ...]] = {
     BOUNDED_ABOVE: ("high",),
     **{NOT_DETERMINED: (), FIT_REJECTED: (), "": ()},
 }
+_FITS = OK, DOUBTFUL, REJECTED, FAILED
 _CONFIDENCES = 0.5, 0.99
 _ONE_SIDED = {BOUNDED_ABOVE: ("at most", "lower"), BOUNDED_BELOW: ("at least", "higher")}
 _UNDATED: dict[str, dict[str, None]] = {"png": {}, "pdf": {"CreationDate": None}}
@@ -84,17 +86,21 @@ def groups(
                 f"identify --csv` wrote, and of --by and --unit columns of it.{near}"
             )
     traces = [dict(zip(header, map(visible, row), strict=True)) for row in rows]
+    # Names of two of the columns end with the unit of what is read.
+    mine = {*OF_TRACES, *columns}
+    copied = {it for it in header if it not in mine and not it.startswith(("noise", "misfit"))}
+    used, told = [], []
     for number, own in enumerate(traces, start=2):
-        for column, allowed in _complaints(own, made_by, units):
-            where = f"{visible(found)}, row {number} ({own['trace']}), {column}"
-            raise BiogripError(f"{where}: found '{own[column]}'; allowed is {allowed}.")
-    for path in filter(None, (table, plot)):
-        refuse_inputs([path], [found])
-        check_output(path)
+        where = f"{visible(found)}, row {number} ({own['trace']})"
+        if own["fit"] not in _FITS:
+            _refuse(own, "fit", ", ".join(_FITS), where)
+        if all(own[name] for name in made_by) and _is_used(own):
+            used.append(own)
+            told.append(_told(own, copied | {*made_by}, units, where))
+    check_outputs([*filter(None, (table, plot))], [found])
     if plot is not None and plot.suffix not in (".png", ".pdf"):
         text = f"found {visible(plot)}; allowed is a name that ends with .png or .pdf."
         raise BiogripError(f"--plot: {text}")
-    used = [own for own in traces if all(own[name] for name in made_by) and _is_used(own)]
     levels = sorted({float(own["confidence"]) for own in used})
     if len(levels) != 1:
         of = " and ".join(map(str, levels)) or "no trace of a group"
@@ -103,10 +109,6 @@ def groups(
             "traces that were identified."
         )
     (confidence,) = levels
-    # Names of two of the columns end with the unit of what is read.
-    mine = {*OF_TRACES, *columns}
-    copied = {it for it in header if it not in mine and not it.startswith(("noise", "misfit"))}
-    told = [_told(own, copied | {*made_by}, units) for own in used]
     cells = gather(told, by, unit, confidence)
     names = list(dict.fromkeys(own[by] for own in traces if all(own[it] for it in made_by)))
     compared = compare(cells, names, confidence, units=unit is not None)
@@ -143,7 +145,6 @@ def groups(
 
 
 def _draw(cells: Sequence[Cell], compared: Compared, units: Mapping[str, str], plot: Path) -> None:
-    """Draw cells in one column of a journal."""
     # Imported here: loading Matplotlib takes long.
     from biogrip.figures.cells import ONE_COLUMN_IN, draw_cells
     from biogrip.figures.style import styled
@@ -155,18 +156,31 @@ def _draw(cells: Sequence[Cell], compared: Compared, units: Mapping[str, str], p
         drawn.savefig(scratch, format=kind, dpi=300, metadata=mark | _UNDATED[kind])
 
 
-def _told(own: Mapping[str, str], copied: set[str], units: Mapping[str, str]) -> Told:
-    """Return what a row tells; `_complaints` has seen it."""
-
-    def number(text: str) -> float | None:
-        return None if isnan(found := _number(text)) else found
-
+def _told(own: Mapping[str, str], copied: set[str], units: Mapping[str, str], where: str) -> Told:
+    """Return what a row tells; refuse what `identify` does not write there."""
+    lowest, highest = _CONFIDENCES
+    if not lowest <= _number(own["confidence"]) <= highest:
+        _refuse(own, "confidence", f"a number from {lowest} to {highest}", where)
     quantities = {}
     for name, unit in units.items():
-        verdict, low, value, high = (own[column] for column in _columns(name, unit).values())
-        quantities[name] = (verdict, number(value), number(low), number(high))
+        columns = _columns(name, unit)
+        if (verdict := own[columns["verdict"]]) not in _NUMBERS:
+            _refuse(own, columns["verdict"], ", ".join(_NUMBERS).rstrip(", "), where)
+        least, above, numbers = 0.0, "above 0", dict[str, float]()
+        for what in _NUMBERS[verdict]:
+            number = _number(own[columns[what]])
+            if not (least <= number < inf and number > 0):
+                _refuse(own, columns[what], f"a number {above}", where)
+            least, above = number, f"of at least {number:g}, its {what}"
+            numbers[what] = number
+        value, low, high = map(numbers.get, ("value", "low", "high"))
+        quantities[name] = verdict, value, low, high
     words = {name: own[name] for name in own if name in copied}
     return Told(own["trace"], own["fit"], words, quantities)
+
+
+def _refuse(own: Mapping[str, str], column: str, allowed: str, where: str) -> NoReturn:
+    raise BiogripError(f"{where}, {column}: found '{own[column]}'; allowed is {allowed}.")
 
 
 def _units(header: Sequence[str]) -> dict[str, str]:
@@ -178,42 +192,11 @@ def _units(header: Sequence[str]) -> dict[str, str]:
 
 
 def _columns(name: str, unit: str) -> dict[str, str]:
-    """Return the columns of a quantity by what they have."""
     numbers = {what: with_unit(f"{name} {what}", unit) for what in _NUMBERS[DETERMINED]}
     return {"verdict": f"{name} verdict"} | numbers
 
 
-def _complaints(
-    own: Mapping[str, str], made_by: Sequence[str], units: Mapping[str, str]
-) -> Iterator[tuple[str, str]]:
-    """Yield columns of a row with what `identify` does not write there, and what is allowed.
-
-    Of a trace that is left out only its fit counts.
-    """
-    fits = OK, DOUBTFUL, REJECTED, FAILED
-    if own["fit"] not in fits:
-        yield "fit", ", ".join(fits)
-    if not (_is_used(own) and all(own[name] for name in made_by)):
-        return
-    low, high = _CONFIDENCES
-    if not low <= _number(own["confidence"]) <= high:
-        yield "confidence", f"a number from {low} to {high}"
-    for columns in map(_columns, units, units.values()):
-        verdict = columns["verdict"]
-        if own[verdict] not in _NUMBERS:
-            yield verdict, ", ".join(_NUMBERS).rstrip(", ")
-            return
-        least, above = 0.0, "above 0"
-        for what in _NUMBERS[own[verdict]]:
-            number = _number(own[columns[what]])
-            if not (least <= number < inf and number > 0):
-                yield columns[what], f"a number {above}"
-                return
-            least, above = number, f"of at least {number:g}, its {what}"
-
-
 def _number(text: str) -> float:
-    """Return the number in a cell, nan if there is none."""
     try:
         return float(text)
     except ValueError:
@@ -385,5 +368,4 @@ def _tests(cells: Sequence[Cell], names: Sequence[str], by: str, unit: str | Non
 
 
 def _few(names: Sequence[str]) -> str:
-    """Return names, of many their number."""
     return ", ".join(names) if len(names) <= _FEW else f"{len(names)} cells"

@@ -4,10 +4,8 @@ import os
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from itertools import zip_longest
-
-QUIET = "BIOGRIP_QUIET"
-"""Environment variable; if set, jobs print warnings but no progress."""
 
 CLEARED = "\r\x1b[K"
 """What clears a line of a terminal."""
@@ -53,7 +51,7 @@ def open_closed_streams() -> None:
             setattr(sys, name, os.fdopen(number, mode, encoding="utf-8", closefd=False))
 
 
-class Progress:
+class Progress(AbstractContextManager["Progress"]):
     """Counter of the completed pieces of a job.
 
     If it is live, it shows every phase on the terminal in a line that is cleared at the end: not
@@ -64,14 +62,10 @@ class Progress:
         self._what = visible(what)
         self._total = total
         self._alone, self._live = live, live and sys.stderr.isatty()
-        self._quiet = quiet or QUIET in os.environ
+        self._quiet = quiet
         self._done = 0
         self._phase = ""
         self._said = time.monotonic()
-
-    def __enter__(self) -> "Progress":
-        """Return the counter."""
-        return self
 
     def __exit__(self, *_: object) -> None:
         """Clear the line on the terminal."""
@@ -90,10 +84,9 @@ class Progress:
         self._say("")
 
     def note(self, text: str) -> None:
-        """Print lines for people, unless progress is not to be printed."""
-        if QUIET not in os.environ:
-            cleared = CLEARED if self._live else ""
-            print(f"{cleared}{visible_lines(text)}", file=sys.stderr, flush=True)
+        """Print lines for people."""
+        cleared = CLEARED if self._live else ""
+        print(f"{cleared}{visible_lines(text)}", file=sys.stderr, flush=True)
 
     def within(self, evaluations: int, misfit: float) -> None:
         """Print the progress of an identification within a piece."""

@@ -231,7 +231,7 @@ def test_a_study_of_one_s_own_has_a_page_without_the_paper(
         "verdicts": [results / "identifiability" / "mine.json"],
         "measurements": [results / "measurements" / "mine" / "seeds_0-0.npz"],
     }
-    write_report(study, "", files, tmp_path / "page.html", tmp_path / "front.html")
+    write_report(study, **files, page=tmp_path / "page.html", front=tmp_path / "front.html")
     assert not re.search("of the paper|[Pp]aper's", (tmp_path / "page.html").read_text("utf-8"))
     page = visit(tmp_path / "page.html", viewport=PHONE).page
     assert page.locator("h1").inner_text() == page.title() == "A trace of mine"

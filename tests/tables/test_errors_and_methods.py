@@ -154,7 +154,7 @@ def test_verdicts_are_listed_beside_what_was_expected(tmp_path: Path) -> None:
     write_object(tmp_path / "a.json", {**told, "quantities": [first, second]})
     write_object(tmp_path / "b.json", {**told, "quantities": [{**first, "high": 4.0}]})
     known = seen(name="x", title="X", parameters={"k": 2.5, "c": 1.0, "c_p": 0.5})
-    table = cases.verdicts(known, tmp_path / "a.json", [tmp_path / "b.json"])
+    table = cases.verdicts_of_case(known, tmp_path / "a.json", [tmp_path / "b.json"])
     k, total = table.rows
     assert k["excluded"] == "1.5 to 1.8"
     headings = {column.name: column.heading for column in table.columns}
@@ -194,7 +194,7 @@ def test_of_dampers_that_trade_the_sum_is_ten() -> None:
         assert told[0] == pytest.approx(value)
         assert told[1] < told[0] < told[2]
     assert cases.value_in_case(STUDY.cases["liquid_drop_1"], ["alpha"]) is None
-    assert cases.interval_of_value(0.23) == pytest.approx((0.225, 0.24))
+    assert cases.interval_of(0.23, None, None) == pytest.approx((0.225, 0.24))
 
 
 def found(misfit: list[float], noise: list[float | None]) -> pd.DataFrame:

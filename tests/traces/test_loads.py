@@ -137,7 +137,7 @@ def test_a_load_that_is_there_in_the_first_row_came_before_it(
     tmp_path: Path, first_s: float
 ) -> None:
     clock = first_s + CLOCK
-    case = case_of(loaded(tmp_path / "late.csv", clock, clock, np.full(len(clock), 5.0)))
+    case, _ = case_of(loaded(tmp_path / "late.csv", clock, clock, np.full(len(clock), 5.0)))
     assert case.block.protocol.phases[0].duration_s == pytest.approx(clock[-1])
     experiment = case.judged_experiment
     assert not experiment.start_given
@@ -149,7 +149,7 @@ def test_a_load_whose_first_row_is_missing_goes_on_in_a_line(tmp_path: Path, beg
     """A sine of 25 rows a period, held up to its first row, moves limits by two of their widths."""
     clock = CLOCK[1:]
     load = np.sin(0.8 * np.pi * clock) if begins == "smoothly" else np.where(clock < 0.15, 5.0, 2.0)
-    record = case_of(loaded(tmp_path / "sine.csv", clock, clock, load)).judged_experiment.record
+    record = case_of(loaded(tmp_path / "sine.csv", clock, clock, load))[0].record
     assert record is not None
     # A line from row to row is off by (omega h)^3 = 0.016.
     expected = 0.0 if begins == "smoothly" else 5.0
@@ -199,7 +199,7 @@ def test_a_column_of_the_load_is_the_protocol_of_all_rows(tmp_path: Path, start_
     """Where it holds still, rows are no phases."""
     asked = written(tmp_path / "t.csv", start_s)
     rows = Setting("--set", ("measurement", "rows"), {"Segment": "dwell"})
-    case = case_of(Asked(asked.trace, None, (*asked.settings, rows)))
+    case, _ = case_of(Asked(asked.trace, None, (*asked.settings, rows)))
     history = case.experiment.torque
     assert history.deforms
     np.testing.assert_allclose(evaluate(history, EVEN), 5e-6 * load_at(EVEN), atol=1e-15)

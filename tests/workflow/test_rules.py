@@ -1,5 +1,7 @@
 import re
 import sys
+from importlib import import_module
+from inspect import signature
 from pathlib import Path
 
 import pytest
@@ -29,6 +31,17 @@ def test_a_rule_says_what_it_does_and_depends_on(name: str) -> None:
         assert "settings_of(" in body or name == "traces"
     logs = re.findall(r'"results/logs/(.+)\.log"', body)
     assert {*re.findall(r'"results/benchmarks/(.+)\.tsv"', body)} <= {*logs}
+
+
+def test_the_functions_that_a_rule_names_take_what_it_has() -> None:
+    seen = set()
+    for name, (_, body) in WRITTEN.items():
+        has = {*re.findall(r"^ +(\w+)=", body, re.MULTILINE), *re.findall(r"{(\w+)}", body)}
+        for module, function in re.findall(r'"(\w+\.\w+)\.(\w+)"', body.partition("stages=")[2]):
+            stage = getattr(import_module(f"biogrip.{module}"), function)
+            assert {*signature(stage).parameters} <= has | {"case", "study", "seeds"}, name
+            seen.add(name)
+    assert {"target", "case_tables", "sweep", "check", "convert_table", "page"} <= seen
 
 
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda file: file.stem)

@@ -32,7 +32,7 @@ from biogrip.records.rows import RowFile
 from biogrip.stages.job import job_study, logged, paths
 from biogrip.study.study import Case, Study
 from biogrip.tables.cases import value_in_case
-from biogrip.tables.layout import Column, Row, ShownTable, write
+from biogrip.tables.layout import Column, Row, ShownTable, titled, write
 
 if TYPE_CHECKING:
     snakemake: Any
@@ -249,15 +249,13 @@ def judge_all(claims: Sequence[Mapping[str, Any]], results: Results, caption: st
 
 _COMPARED_COLUMNS = (
     Column("case", "Sample"),
-    Column("quantity", "Quantity"),
-    Column("unit", "Unit"),
+    *titled("quantity", "unit"),
     Column("target", "Target", 4),
     Column("printed_from", "Paper from", 4),
     Column("printed_to", "to", 4),
     Column("error_from_percent", "Its error % from", 2),
     Column("error_to_percent", "to", 2),
-    Column("reading", "Reading"),
-    Column("runs", "Runs"),
+    *titled("reading", "runs"),
     Column("median_error_percent", "Median error of a run %", 2),
     Column("median_from_percent", "from", 2),
     Column("median_to_percent", "to", 2),

@@ -23,15 +23,13 @@ from biogrip.records.traces import read_measurements
 from biogrip.stages.job import job_study, logged, paths
 from biogrip.study.study import Case, Study
 from biogrip.tables.cases import error_percent, value_in_case
-from biogrip.tables.layout import Column, Row, ShownTable, write
+from biogrip.tables.layout import Column, Row, ShownTable, titled, write
 
 if TYPE_CHECKING:
     snakemake: Any
 
 _COLUMNS = (
-    Column("quantity", "Quantity"),
-    Column("unit", "Unit"),
-    Column("paper", "Paper"),
+    *titled("quantity", "unit", "paper"),
     Column("this_study", "This study", 3),
     Column("remark", "Remark"),
 )
@@ -102,9 +100,7 @@ def _axis(case: Case, traces: list[Path]) -> list[_Told]:
 
 
 _PRINTED_COLUMNS = (
-    Column("case", "Case"),
-    Column("parameter", "Parameter"),
-    Column("quantity", "Quantity"),
+    *titled("case", "parameter", "quantity"),
     Column("printed", "Printed", 4),
     Column("nearest_encodable", "Nearest encodable", 2),
     Column("distance_percent", "Distance %", 2),
@@ -162,8 +158,7 @@ _TRADING = 2.0
 # Rate (Hz) from which bounds are taken to others, and the share of chi-squared that counts.
 _NEAR, _MIDDLE = 10.0, 0.95
 _SAMPLING_COLUMNS = (
-    Column("case", "Case"),
-    Column("parameter", "Parameter"),
+    *titled("case", "parameter"),
     Column("paper_error_percent", "Paper's error %", 2),
     Column("paper_error_from_percent", "from", 2),
     Column("paper_error_to_percent", "to", 2),

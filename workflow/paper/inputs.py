@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 from biogrip.physics.sample_model import SINGLE_BRANCH
 from biogrip.stages.job import job_study, logged
 from biogrip.study.study import Study
-from biogrip.tables.layout import Column, ShownTable, write
+from biogrip.tables.layout import Column, ShownTable, titled, write
 
 if TYPE_CHECKING:
     snakemake: Any
@@ -15,13 +15,7 @@ _LEGEND = (
     " Stated: by the paper, or by whoever changed the config. "
     "Reconstructed: the paper's value is not available to us."
 )
-_QUANTITY_COLUMNS = (
-    Column("symbol", "Symbol"),
-    Column("meaning", "Meaning"),
-    Column("value", "Value"),
-    Column("unit", "Unit"),
-    Column("source", "Source"),
-)
+_QUANTITY_COLUMNS = titled("symbol", "meaning", "value", "unit", "source")
 # Key of the config, symbol, meaning and unit.
 _OF_ARM = (
     ("inertia_kgm2", "I", "moment of inertia", "kg m²"),
@@ -38,19 +32,9 @@ _OF_ACTUATOR = (
     ("initial_overlap_deg", "theta", "initial overlap", "deg"),
     ("first_radius_m", "r_0", "radius of the first finger", "m"),
 )
-_GENE_COLUMNS = (
-    Column("gene", "Gene"),
-    Column("parameter", "Parameter"),
-    Column("role", "Role"),
-    Column("min", "Min"),
-    Column("max", "Max"),
-    Column("values", "Values"),
-    Column("source", "Source"),
-)
+_GENE_COLUMNS = titled("gene", "parameter", "role", "min", "max", "values", "source")
 _RANGE_COLUMNS = (
-    Column("parameter", "Parameter"),
-    Column("meaning", "Meaning"),
-    Column("unit", "Unit"),
+    *titled("parameter", "meaning", "unit"),
     Column("min", "Min", 2),
     Column("max", "Max", 2),
 )

@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 
 from biogrip.arrays import Array
+from biogrip.digits import significant
 from biogrip.errors import BiogripError
 from biogrip.fit.least_squares import identify_many
 from biogrip.physics import gripper as actuator
@@ -33,10 +34,9 @@ from biogrip.physics.simulation import (
     simulated_response,
 )
 from biogrip.physics.unilateral import unilateral_response
-from biogrip.records.traces import as_written
 from biogrip.stages.job import job_study, logged
 from biogrip.study.study import Case, Study
-from biogrip.tables.layout import Column, Row, ShownTable, write
+from biogrip.tables.layout import Column, Row, ShownTable, titled, write
 
 if TYPE_CHECKING:
     snakemake: Any
@@ -245,8 +245,7 @@ def _mechanics_of(case: Case) -> list[Row]:
 _LEFT_OUT_COLUMNS = (
     Column("effect", "Left out"),
     Column("size", "Size", 2),
-    Column("unit", "Unit"),
-    Column("beside", "Beside"),
+    *titled("unit", "beside"),
     Column("beside_size", "which is", 2),
     Column("share_percent", "Share (%)", 2),
     Column("remark", "Remark"),
@@ -306,9 +305,7 @@ _LARGEST_PERCENT = 1000.0
 _COLUMNS = (
     Column("case", "Case"),
     Column("lost_at_s", "Contact lost at (s)"),
-    Column("quantity", "Quantity"),
-    Column("unit", "Unit"),
-    Column("target", "Target"),
+    *titled("quantity", "unit", "target"),
     Column("held", "Held throughout"),
     Column("let_go", "Let go"),
     Column("error_percent", "Error (%)"),
@@ -341,8 +338,9 @@ def _loss_of(study_seed: int, case: Case) -> list[Row]:
     free = unilateral_response(*device, time_s)
     if not free.parted_s:
         return []
-    held = as_written(simulated_response(*device, time_s, nonlinear=False)[0])
-    let_go = as_written(free.rotation[0])
+    # As the targets of a case are written.
+    read = simulated_response(*device, time_s, nonlinear=False)[0], free.rotation[0]
+    held, let_go = (significant(each, 9) for each in read)
     rngs = [
         stream(study_seed, case.name, seed, "noise") for seed in range(min(case.seeds, _MOST_SEEDS))
     ]

@@ -20,7 +20,7 @@ from biogrip.physics.simulation import compute_grip, jaw_force, simulated_respon
 from biogrip.records.identifications import read_batch, share_with_limits
 from biogrip.stages.job import job_study, logged, paths
 from biogrip.study.study import Case, Study
-from biogrip.tables.layout import Column, Row, ShownTable, write
+from biogrip.tables.layout import Column, Row, ShownTable, titled, write
 
 if TYPE_CHECKING:
     snakemake: Any
@@ -31,9 +31,7 @@ _MIDDLE = 1.96
 """Standard deviations that hold 95 % of the estimates."""
 
 _COLUMNS = (
-    Column("case", "Case"),
-    Column("quantity", "Quantity"),
-    Column("unit", "Unit"),
+    *titled("case", "quantity", "unit"),
     Column("target", "Target", 4),
     Column("lowest_force_uN", "Lowest jaw force (µN)", 2),
     Column("readings", "Readings"),

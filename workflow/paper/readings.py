@@ -23,8 +23,8 @@ from biogrip.stages.job import job_study, logged, paths
 from biogrip.study.case_blocks import CaseBlock
 from biogrip.study.source import overlaid
 from biogrip.study.study import Study
-from biogrip.tables.cases import interval_of_value, value_in_case
-from biogrip.tables.layout import Column, Row, ShownTable, write
+from biogrip.tables.cases import interval_of, value_in_case
+from biogrip.tables.layout import Column, Row, ShownTable, titled, write
 
 if TYPE_CHECKING:
     snakemake: Any
@@ -70,7 +70,7 @@ def printable(study: Study, reading: str) -> dict[str, int]:
         ranges = built(CaseBlock, overlaid(case.plain, changes)).search_range
         for name, printed in case.published.identified.items():
             held = getattr(ranges, name).values
-            ends = {"exactly": (printed, printed), "rounded": interval_of_value(printed)}
+            ends = {"exactly": (printed, printed), "rounded": interval_of(printed, None, None)}
             ends["with_error"] = (value_in_case(case, [name]) or ends["rounded"])[-2:]
             counts["values"] += 1
             for how, (low, high) in ends.items():
@@ -205,9 +205,7 @@ def found_by_readings(study: Study, found: Found) -> ShownTable:
     rows = [{k: v for k, v in row.items() if k != "error_percent c_p"} for row in rows]
     words = near_noise_words(study.near_noise_tolerance)
     columns = (
-        Column("case", "Case"),
-        Column("reading", "Reading"),
-        Column("seeds", "Seeds"),
+        *titled("case", "reading", "seeds"),
         *map(Column, _SHARES, (f"Share {words}", "95 % from", "to"), (2, 2, 2)),
         Column("as_close_share", "Share as close as the paper", 2),
         *(Column(f"error_percent {name}", f"Error {name} %", 2) for name in names),

@@ -14,7 +14,7 @@ from biogrip.physics.sample_model import SINGLE_BRANCH
 from biogrip.records.identifications import READINGS
 from biogrip.records.traces import read_target
 from biogrip.stages.identification import groups
-from biogrip.stages.job import logged, run
+from biogrip.stages.job import arguments, logged
 from biogrip.stages.targets import response
 from biogrip.study.case_blocks import CaseBlock
 from biogrip.study.source import overlaid
@@ -67,4 +67,4 @@ def _reading_rows(case: Case, target: Path) -> Iterator[tuple[str | int, ...]]:
 
 if __name__ == "__main__":
     with logged(snakemake):
-        run(snakemake, identify_readings)
+        identify_readings(**arguments(snakemake, identify_readings))

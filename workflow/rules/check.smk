@@ -28,10 +28,11 @@ rule check:
     localrule: True
     params:
         published=PUBLISHED / "tables",
+        stages=["tables.layout.compare"],
     message:
         "Comparing the tables with the published ones"
     script:
-        "../scripts/check.py"
+        "../scripts/stage.py"
 
 
 rule publish:

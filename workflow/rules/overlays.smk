@@ -31,10 +31,14 @@ rule sweep:
             # All, for points are cases with some keys changed.
             *keys_of_cases(STUDY, *CASE_KEYS),
         ),
+        stages=[
+            *("tables.sweeps.judge", "tables.sweeps.write_robustness"),
+            "figures.overview.save_robustness",
+        ],
     message:
         "Judging and drawing the sweep {wildcards.sweep}"
     script:
-        "../scripts/sweep.py"
+        "../scripts/stage.py"
 
 
 if STUDY.config.traces:
@@ -87,7 +91,7 @@ if STUDY.config.traces:
 
     rule traces:
         input:
-            batches=[
+            parts=[
                 f"results/traces/batches/{first}-{first + STUDY.config.traces.rows_a_batch - 1}.csv"
                 for first in range(0, len(ROWS), STUDY.config.traces.rows_a_batch)
             ],
@@ -97,7 +101,8 @@ if STUDY.config.traces:
             "results/logs/traces.log",
         params:
             rows=len(ROWS),
+            stages=["command.outputs.join_tables"],
         message:
             "Putting together the tables of all traces"
         script:
-            "../scripts/traces.py"
+            "../scripts/stage.py"

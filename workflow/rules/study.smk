@@ -10,7 +10,7 @@ rule target:
         case=names(SIMULATED),
     params:
         **settings_of("actuator", "gripper", "contact", "models", *SAMPLE, *SAMPLING),
-        stages=["targets.simulate"],
+        stages=["stages.targets.simulate"],
     message:
         "Simulating the response of {wildcards.case}"
     script:
@@ -29,7 +29,7 @@ rule measurement:
         case=names(SIMULATED),
     params:
         **settings_of("study_seed", "actuator", NOISE, *SAMPLE, *SAMPLING),
-        stages=["targets.measure"],
+        stages=["stages.targets.measure"],
     message:
         "Adding noise to {wildcards.case}, {wildcards.batch}"
     script:
@@ -51,7 +51,7 @@ rule recording:
         recorded=lambda wildcards: {
             "recorded": digest_of(Path(STUDY.case(wildcards.case).block.measurement.file))
         },
-        stages=["targets.record"],
+        stages=["stages.targets.record"],
     message:
         "Reading the recorded trace of {wildcards.case}"
     script:
@@ -68,7 +68,7 @@ rule calibration:
         case=names(CALIBRATED),
     params:
         **settings_of("study_seed", "actuator", "gripper", "calibration", *SAMPLE),
-        stages=["targets.calibrate_gripper"],
+        stages=["stages.targets.calibrate_gripper"],
     message:
         "Calibrating the gripper of {wildcards.case} without a sample"
     script:
@@ -91,7 +91,7 @@ rule identification:
     params:
         **settings_of("study_seed", "actuator", *FIT),
         method=lambda wildcards: settings(STUDY, METHODS[wildcards.method].blocks, wildcards.case),
-        stages=["identification.identify"],
+        stages=["stages.identification.identify"],
     message:
         "Identifying {wildcards.case} by {wildcards.method}, {wildcards.batch}"
     script:
@@ -119,7 +119,7 @@ rule judgement:
             *("study_seed", "actuator", *FIT, *SAMPLING, NOISE),
             *("identifiability.confidence", "least_squares"),
         ),
-        stages=["judgement.judge", "judgement.expect"],
+        stages=["stages.judgement.judge", "stages.judgement.expect"],
     message:
         "Computing confidence limits for the first trace of {wildcards.case}"
     script:
@@ -134,7 +134,7 @@ use rule judgement as recorded_judgement with:
         case=names(STUDY.recorded),
     params:
         **settings_of("measurement.start_s", "model_selection"),
-        stages=["judgement.judge"],
+        stages=["stages.judgement.judge"],
 
 
 rule intervals:
@@ -157,7 +157,7 @@ rule intervals:
             *("study_seed", "actuator", *FIT, *SAMPLING, NOISE, "least_squares"),
             *("identifiability.confidence", "identifiability.verdicts_every"),
         ),
-        stages=["judgement.estimate"],
+        stages=["stages.judgement.estimate"],
     message:
         "Estimating intervals of {wildcards.case}, {wildcards.batch}"
     script:
@@ -178,7 +178,7 @@ rule model_fits:
         runtime=60,
     params:
         **settings_of("study_seed", "actuator", *FIT, "model_selection", "least_squares"),
-        stages=["identification.fit"],
+        stages=["stages.identification.fit"],
     message:
         "Fitting every sample model to {wildcards.case}, {wildcards.batch}"
     script:

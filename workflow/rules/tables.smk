@@ -7,7 +7,7 @@ rule case_tables:
         histories=of_case("results/histories/{case}/{method}/{batch}.npz"),
         measurements=of_case("results/measurements/{case}/{batch}.npz", STUDY.simulated),
         calibrated=calibration_of,
-        verdicts="results/identifiability/{case}.json",
+        judged="results/identifiability/{case}.json",
         expected=of_case("results/identifiability/expected/{case}.json", STUDY.simulated),
     output:
         identifications="results/identifications/{case}.csv",
@@ -24,10 +24,11 @@ rule case_tables:
         case=names(STUDY.cases),
     params:
         **settings_of("actuator", "methods", "seeds", "evaluation", "title", "published", *FIT),
+        stages=["stages.identification.join", "tables.cases.write_tables"],
     message:
         "Writing the tables of {wildcards.case}"
     script:
-        "../scripts/case_tables.py"
+        "../scripts/stage.py"
 
 
 rule tables:
@@ -58,9 +59,9 @@ rule tables:
 
 rule convert_table:
     input:
-        "results/tables/{name}.html",
+        page="results/tables/{name}.html",
     output:
-        "results/tables/{name}.{format}",
+        converted="results/tables/{name}.{format}",
     log:
         "results/logs/convert_table/{name}.{format}.log",
     wildcard_constraints:
@@ -68,10 +69,11 @@ rule convert_table:
     localrule: True
     params:
         **settings_of(),
+        stages=["tables.layout.write_converted"],
     message:
         "Writing the table {wildcards.name} as {wildcards.format}"
     script:
-        "../scripts/convert_table.py"
+        "../scripts/stage.py"
 
 
 # Every table in a format that papers or forges read.

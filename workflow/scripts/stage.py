@@ -1,10 +1,11 @@
-"""Do the stages that the rule names, functions in modules of `biogrip.stages`."""
+"""Do the stages that the rule names: functions, by their modules in `biogrip`."""
 
 from importlib import import_module
 
-from biogrip.stages.job import logged, run
+from biogrip.stages.job import arguments, logged
 
 with logged(snakemake):
     for stage in snakemake.params.stages:
-        module, _, function = stage.partition(".")
-        run(snakemake, getattr(import_module(f"biogrip.stages.{module}"), function))
+        module, _, name = stage.rpartition(".")
+        function = getattr(import_module(f"biogrip.{module}"), name)
+        function(**arguments(snakemake, function))

@@ -12,7 +12,6 @@ from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
-from importlib.metadata import version
 from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
@@ -24,7 +23,7 @@ from biogrip.command.outputs import (
     WRITTEN_BY,
     Outcome,
     as_written,
-    check_output,
+    check_outputs,
     read_result,
     table_of,
     write_result,
@@ -39,7 +38,7 @@ from biogrip.command.settings import (
 )
 from biogrip.command.words import in_columns, in_words
 from biogrip.errors import BiogripError
-from biogrip.files import digest_of, refuse_inputs, software
+from biogrip.files import digest_of, software
 from biogrip.fit.genome import SearchRange
 from biogrip.identify.data import trace_data
 from biogrip.identify.identify import STEPS, budget, identify_alike
@@ -106,11 +105,7 @@ def identify_files(
     outputs = [output or own.output for own in every]
     outputs = outputs if rows is None else []
     written = [*outputs, *filter(None, (report, table))]
-    if len({path.absolute() for path in written}) < len(written):
-        raise BiogripError("found the same file to be written twice; allowed are different ones.")
-    refuse_inputs(written, [*files, *(own.trace for own in every), *filter(None, [config])])
-    for path in written:
-        check_output(path)
+    check_outputs(written, [*files, *(own.trace for own in every), *filter(None, [config])])
     drawn = report is not None and len(every) <= MOST_DRAWN
     outcome = _identify_traces(every, outputs or None, drawn=drawn)
     if alone and outcome.refused:
@@ -265,14 +260,15 @@ def identify_batch(
     made_from = [] if outputs is None else [*map(_made_from, asked)]
     name, count = asked[0].name if alone else "", 1 + STEPS
     with Progress(name, count, live=alone, quiet=not alone) as progress:
-        cases, traces, refused = _read_batch(asked, progress)
-        judged = _judge_batch(asked, traces, refused, progress)
+        read = [_tried(own, _read, own, progress) for own in asked]
+        judged = _judge_batch(asked, read, progress)
     outcome = Outcome([], {})
-    for index, own in enumerate(asked):
-        if index in refused:
-            outcome.refused[own.name] = str(refused[index])
+    for index, (own, found) in enumerate(zip(asked, judged, strict=True)):
+        if isinstance(found, BiogripError):
+            outcome.refused[own.name] = str(found)
             continue
-        data = data_of(judged[index], cases[index], own.name, own.given)
+        diagnosis, case = found
+        data = data_of(diagnosis, case, own.name, own.given)
         outcome.found.append(data)
         if outputs is not None:
             write_result(outputs[index], data, made_from[index])
@@ -280,44 +276,31 @@ def identify_batch(
             # Imported here: loading Matplotlib takes long.
             from biogrip.command.page import draw
 
-            pictures = _tried(own, draw, judged[index], data)
+            pictures = _tried(own, draw, diagnosis, data)
             if not isinstance(pictures, BiogripError):
                 outcome.pictures[own.name] = pictures
     return outcome
 
 
-def _read_batch(
-    asked: Sequence[Asked], progress: Progress
-) -> tuple[dict[int, Case], dict[int, Trace], dict[int, BiogripError]]:
-    """Return cases, prepared traces, and errors of traces that cannot be used, by index."""
-    cases: dict[int, Case] = {}
-    traces: dict[int, Trace] = {}
-    refused: dict[int, BiogripError] = {}
-
-    def read(own: Asked) -> tuple[Case, Trace]:
-        recording, case = read_trace(own)
-        if not is_usual(recording):
-            progress.note(form_in_words(own.trace, recording.form))
-        return case, prepare(recording, case.judged_experiment)
-
-    for index, own in enumerate(asked):
-        found = _tried(own, read, own)
-        if isinstance(found, BiogripError):
-            refused[index] = found
-        else:
-            cases[index], traces[index] = found
-    return cases, traces, refused
+def _read(own: Asked, progress: Progress) -> tuple[Case, Trace]:
+    """Return the case that a trace is, and the trace, prepared."""
+    recording, case = read_trace(own)
+    if not is_usual(recording):
+        progress.note(form_in_words(own.trace, recording.form))
+    return case, prepare(recording, case.judged_experiment)
 
 
 def _judge_batch(
     asked: Sequence[Asked],
-    traces: Mapping[int, Trace],
-    refused: dict[int, BiogripError],
+    read: Sequence[tuple[Case, Trace] | BiogripError],
     progress: Progress,
-) -> dict[int, Diagnosis]:
-    """Return diagnoses by index; add errors of the traces that cannot be fitted."""
+) -> list[tuple[Diagnosis, Case] | BiogripError]:
+    """Return diagnoses, or errors of the traces that cannot be read or fitted."""
+    usable = {i: it for i, it in enumerate(read) if not isinstance(it, BiogripError)}
+    judged: dict[int, tuple[Diagnosis, Case] | BiogripError]
+    judged = {i: it for i, it in enumerate(read) if isinstance(it, BiogripError)}
     alike = defaultdict[Hashable, list[int]](list)
-    for index, (recording, experiment) in traces.items():
+    for index, (_, (recording, experiment)) in usable.items():
         few = len(recording.time_s) * _MOST_IN_BATCH <= _MOST_READINGS
         alike[budget(experiment), None if few else index].append(index)
 
@@ -325,22 +308,21 @@ def _judge_batch(
         progress.done()
         progress.doing(step)
 
-    judged: dict[int, Diagnosis] = {}
     groups = [*alike.values()]
     # An error is of one of a group: it is then identified one by one.
     for group in groups:
         found = _tried(
             asked[group[0]],
             partial(identify_alike, progress=progress.within, doing=doing),
-            [traces[index] for index in group],
+            [usable[index][1] for index in group],
         )
         if not isinstance(found, BiogripError):
-            judged.update(zip(group, found, strict=True))
+            judged |= {i: (it, usable[i][0]) for i, it in zip(group, found, strict=True)}
         elif len(group) == 1:
-            refused[group[0]] = found
+            judged[group[0]] = found
         else:
             groups += ([index] for index in group)
-    return judged
+    return [judged[index] for index in range(len(read))]
 
 
 def _tried(asked: Asked, work: Callable[..., T], *given: Any) -> T | BiogripError:
@@ -387,10 +369,7 @@ def data_of(
             for name in ("gripper", "protocol")
             if case.instrument.has_jaws and not {*(given.get(name) or ())} - {"uncertainty"}
         ],
-        "versions": {
-            "biogrip": __version__,
-            **{name: version(name) for name in ("numpy", "scipy")},
-        },
+        "versions": {name: it for name, it in software().items() if name != "source"},
     }
 
 

@@ -3,7 +3,7 @@
 import json
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from io import StringIO
 from pathlib import Path
@@ -58,8 +58,19 @@ class Outcome:
     """Cells to copy from a table of traces by file, of all in the order of its rows, and column."""
 
 
-def check_output(output: Path) -> None:
-    """Refuse, by a `BiogripError`, a file that cannot be written, or that biogrip did not write."""
+def check_outputs(outputs: Sequence[Path], inputs: Iterable[Path]) -> None:
+    """Refuse, by a `BiogripError`, files that are also read, or written twice, or not ours."""
+    if len({path.absolute() for path in outputs}) < len(outputs):
+        raise BiogripError("found the same file to be written twice; allowed are different ones.")
+    # Path.exists raises for invalid paths; os.path.exists returns False.
+    read = [path for path in inputs if os.path.exists(path)]
+    for output in outputs:
+        if os.path.exists(output) and any(output.samefile(path) for path in read):
+            raise BiogripError(f"{visible(output)}: is read; allowed is another file to write.")
+        _check_output(output)
+
+
+def _check_output(output: Path) -> None:
     folder = output.parent
     if os.path.isdir(output) or not os.path.isdir(folder) or not os.access(folder, os.W_OK):
         text = "cannot be written; allowed is a file in a folder that you may write to."
@@ -72,14 +83,13 @@ def check_output(output: Path) -> None:
         raise BiogripError(f"{visible(output)}: cannot be written: {error.strerror}.") from error
     if output.exists() and not output.is_symlink() and not output.is_file():
         raise BiogripError(f"{visible(output)}: is no regular file; allowed is one.")
-    if not os.path.lexists(output):
-        return
-    if not output.is_symlink():
+    ours = not os.path.lexists(output)
+    if not ours and not output.is_symlink():
         with output.open("rb") as stream:
-            if WRITTEN_BY.encode() in stream.read(_HEAD_BYTES):
-                return
-    text = "is there, and biogrip did not write it; allowed is another name, or to delete it first."
-    raise BiogripError(f"{visible(output)}: {text}")
+            ours = WRITTEN_BY.encode() in stream.read(_HEAD_BYTES)
+    if not ours:
+        text = "is there, and biogrip did not write it; allowed is another name, or to delete it "
+        raise BiogripError(f"{visible(output)}: {text}first.")
 
 
 # Keys of a result that are in the unit of what is read.
@@ -114,7 +124,6 @@ def read_result(path: Path, made_from: str) -> dict[str, Any]:
 
 
 def _renamed(data: Any, names: Mapping[str, str]) -> Any:
-    """Return plain data with other keys."""
     if isinstance(data, list):
         return [_renamed(each, names) for each in data]
     if not isinstance(data, dict):
@@ -167,7 +176,7 @@ def table_of(outcome: Outcome) -> tuple[list[str], list[list[Any]]]:
     ]
 
 
-def join_tables(parts: Sequence[Path], table: Path, rows: int) -> None:
+def join_tables(parts: list[Path], table: Path, rows: int) -> None:
     """Write the rows of several tables of traces as one, as if all had been written at once."""
     # Imported here: loading pandas takes long.
     import pandas as pd

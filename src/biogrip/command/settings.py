@@ -126,17 +126,23 @@ class Asked:
 
     @property
     def given(self) -> dict[str, Any]:
-        """Blocks of the user's: those of the config, and over them the settings."""
+        """Blocks of the user's: those of the config, and over them the settings.
+
+        A sphere's force and indentation are what they count as.
+        """
         blocks = read_configs(self.configs)
         for setting in self.settings:
             blocks = _laid_over(blocks, setting)
         measured = _measured(blocks)
-        for name in {*measured} & {*_BY_SPHERE.values()} if measured.get("sphere") else ():
+        if measured.get("sphere") is None:
+            return blocks
+        for name in {*measured} & {*_BY_SPHERE.values()}:
             raise BiogripError(
                 f"{self.place}: found a sphere and a reading of {name}; allowed are a force and an "
                 "indentation, as by --reading force=COLUMN."
             )
-        return _by_sphere(blocks)
+        renamed = {_BY_SPHERE.get(key, key): value for key, value in measured.items()}
+        return {**blocks, "measurement": renamed}
 
     def read(self, columns: Columns) -> Recording:
         """Read the trace; a `BiogripError` has file, line and column, or array and index."""
@@ -170,33 +176,16 @@ def _laid_over(blocks: dict[str, Any], setting: Setting) -> dict[str, Any]:
     return found
 
 
-def _by_sphere(blocks: dict[str, Any]) -> dict[str, Any]:
-    """Return the blocks with a sphere's force and indentation as what they count as."""
-    measured = _measured(blocks)
-    if measured.get("sphere") is None:
-        return blocks
-    renamed = {_BY_SPHERE.get(key, key): value for key, value in measured.items()}
-    return {**blocks, "measurement": renamed}
-
-
 def read_trace(asked: Asked) -> tuple[Recording, Case]:
     """Read a trace, and return it with the case that it is.
 
     A `BiogripError` has file, line and column, or setting, that cannot be used.
     """
-    case, recording = _case_of(asked)
+    case, recording = case_of(asked)
     columns = replace(case.columns, by_options=True)
     # What its protocol follows from was read before the protocol's start was known.
     recording = replace(recording, read=columns) if recording else asked.read(columns)
     return replace(recording, remarks_before=remarks_on_hold(recording, case, asked.given)), case
-
-
-def case_of(asked: Asked) -> Case:
-    """Return the case that a trace is.
-
-    A `BiogripError` has option, row, or file, line and key, if settings or config cannot be used.
-    """
-    return _case_of(asked)[0]
 
 
 def study_of(asked: Asked) -> tuple[str, dict[str, Any], Recording | None, Array | None]:
@@ -210,8 +199,8 @@ def study_of(asked: Asked) -> tuple[str, dict[str, Any], Recording | None, Array
         of_config = [*keys_in(read_configs(asked.configs))]
         said = [".".join(key) + f" of {asked.config}" * (key in of_config) for key in found]
         raise BiogripError(f"{asked.place}: found {' and '.join(said)}; allowed is one of them.")
-    below = read_configs([default_config(), *asked.configs])
-    merged, recording, record = _with_instrument(_by_sphere(overlaid(below, given)), given, asked)
+    merged = overlaid(read_configs([default_config()]), given)
+    merged, recording, record = _with_instrument(merged, given, asked)
     # Cases and a table of the config are meant for the workflow.
     for name in ("only", "traces"):
         merged.pop(name, None)
@@ -221,12 +210,15 @@ def study_of(asked: Asked) -> tuple[str, dict[str, Any], Recording | None, Array
     return case, merged, recording, record
 
 
-def _case_of(asked: Asked) -> tuple[Case, Recording | None]:
-    """Return the case that a trace is, and the trace if its protocol follows from it."""
+def case_of(asked: Asked) -> tuple[Case, Recording | None]:
+    """Return the case that a trace is, and the trace if its protocol follows from it.
+
+    A `BiogripError` has option, row, or file, line and key, if settings or config cannot be used.
+    """
     case, merged, recording, record = study_of(asked)
     files = [default_config(), *asked.configs]
-    below = read_configs(files)
-    sources = [_source(setting, below, merged, case) for setting in asked.settings]
+    known = {*keys_in(read_configs(files))}
+    sources = [_source(setting, known, merged, case) for setting in asked.settings]
     try:
         study = load_study(merged, files, over=sources)
     except BiogripError as error:
@@ -235,9 +227,7 @@ def _case_of(asked: Asked) -> tuple[Case, Recording | None]:
     return replace(study.cases[case], record=record), recording
 
 
-def _source(
-    setting: Setting, below: Mapping[str, Any], merged: Mapping[str, Any], case: str
-) -> Source:
+def _source(setting: Setting, known: set[KeyPath], merged: Mapping[str, Any], case: str) -> Source:
     """Return the keys that a setting is to be named for: its own, and blocks that it adds."""
     path: KeyPath = setting.path
     if path[0] == "sample":
@@ -246,7 +236,6 @@ def _source(
         path = (path[0], *(_BY_SPHERE.get(str(key), key) for key in path[1:]))
     held = {"protocol": merged["protocol"]}
     own = keys_in(held) if path in (HOLD, LOAD) else keys_in(setting.value, path)
-    known = set(keys_in(below))
     above = [path[:length] for length in range(1, len(path)) if path[:length] not in known]
     return setting.by, dict.fromkeys([*above, path, *own])
 
@@ -340,7 +329,6 @@ def _from(load: Array, start_s: float) -> Array:
 
 
 def _instrument(merged: Mapping[str, Any], given: Mapping[str, Any]) -> Instrument:
-    """Return the instrument by the reading that is named, or by kind and protocol."""
     for name in INSTRUMENTS:
         if name in merged["measurement"]:
             return INSTRUMENTS[name]
@@ -362,7 +350,7 @@ def check_settings(traces: Sequence[Asked]) -> None:
         if key in read:
             continue
         try:
-            read[key] = case_of(own).instrument.read.name
+            read[key] = case_of(own)[0].instrument.read.name
         except BiogripError as error:
             read[key] = ""
             problems |= dict.fromkeys(str(error).split("\n"))
@@ -374,7 +362,6 @@ def check_settings(traces: Sequence[Asked]) -> None:
 
 
 def _refuse(problems: Sequence[str]) -> None:
-    """Raise an error with the first few problems, if there are any."""
     more = [f"... and {len(problems) - _MOST_SHOWN} more."] if problems[_MOST_SHOWN:] else []
     if problems:
         raise BiogripError("\n".join([*problems[:_MOST_SHOWN], *more]))
@@ -406,7 +393,6 @@ def _plain(name: str) -> str:
 
 
 def _file_column(names: Sequence[str]) -> str | None:
-    """Return the name of the column of files, or None."""
     found = {_plain(name).replace("_", ""): name for name in reversed(names)}
     return next((found[name] for name in _FILES if name in found), None)
 
@@ -544,20 +530,18 @@ def _column_problems(
     """Find names that stand twice or are those of results, and what looks like a setting."""
     for number, name in enumerate(header):
         cells = [cell for _, row in rows for cell in row[number : number + 1] if cell]
-        text = ""
+        where = place(path, 1, name)
         if name and name in header[:number]:
-            text = "stands twice; allowed is each name once."
+            yield f"{where}: stands twice; allowed is each name once."
         elif name not in used and (name in COLUMNS or _OF_RESULTS.fullmatch(name)):
-            text = "is a column of the results; allowed is another name."
+            yield f"{where}: is a column of the results; allowed is another name."
         elif name and cells and "." not in name and name not in used:
             meant = _meant(name, cells)
             if meant and meant not in map(_plain, header):
-                text = (
-                    f"looks like a setting and is none; allowed is '{meant}' for a column that "
-                    "sets it, in SI units, or a name unlike a setting's."
+                yield (
+                    f"{where}: looks like a setting and is none; allowed is '{meant}' for a column "
+                    "that sets it, in SI units, or a name unlike a setting's."
                 )
-        if text:
-            yield f"{place(path, 1, name)}: {text}"
 
 
 def load_in_words(trace: Trace, case: Case, given: Mapping[str, Any]) -> str:

@@ -362,7 +362,6 @@ def preferred_in_words(found: Mapping[str, Any]) -> list[str]:
 
 
 def _protocol(found: Mapping[str, Any]) -> str:
-    """Return what was held, as in: a stress of 5 Pa for 60 s."""
     if "load" in found:
         controlled = INSTRUMENTS[found["reads"]["quantity"]].controlled.name
         return f"a {controlled} of {found['load'].partition(': ')[2].rstrip('.')}"

@@ -1,8 +1,9 @@
 """Runs of the methods: Figures 8 and 10 over generations, where all runs end, and their errors."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from statistics import NormalDist
+from string import ascii_letters
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,6 @@ from biogrip.arrays import Array
 from biogrip.digits import with_unit
 from biogrip.figures import style
 from biogrip.figures.fit import SHOWN_SEEDS, first_of_basins, seeds_in_words
-from biogrip.judging.quantities import Quantity
 from biogrip.judging.verdicts import DETERMINED
 from biogrip.records.identifications import (
     ENCODABLE,
@@ -37,14 +37,14 @@ _TICKS = (0, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000)
 _LOWEST = 1e-3
 
 
-def _line_of_seed(seed: object, shown: Sequence[int], alpha: float) -> dict[str, Any]:
-    if seed in shown:
-        return {"color": style.RUNS[shown.index(seed)], "linewidth": 1.5, "zorder": 3}
+def _line_of_seed(seed: object, first: Mapping[str, int], alpha: float) -> dict[str, Any]:
+    for own, color in zip(first.values(), style.RUNS, strict=False):
+        if seed == own:
+            return {"color": color, "linewidth": 1.5, "zorder": 3}
     return {"color": style.ALL_SEEDS, "linewidth": 0.4, "alpha": alpha}
 
 
 def _name_seeds(axes: Axes, seeds: int, first: Iterable[str]) -> None:
-    """Add to the legend what the lines of seeds are."""
     if seeds > 1:
         axes.plot([], [], color=style.ALL_SEEDS, linewidth=0.8, label=seeds_in_words(seeds))
     for words, color in zip(first, style.RUNS, strict=False):
@@ -52,37 +52,37 @@ def _name_seeds(axes: Axes, seeds: int, first: Iterable[str]) -> None:
 
 
 def _runs(
-    case: Case, identifications: Path, histories: Path, values: Sequence[str]
-) -> tuple[pd.DataFrame, list[str], list[int], pd.DataFrame]:
-    """Return runs of the shown method, names and seeds of the first in each basin, and histories.
+    case: Case, identifications: Path, history: Path, values: Sequence[str]
+) -> tuple[pd.DataFrame, dict[str, int], pd.DataFrame]:
+    """Return runs of the shown method, the seed of the first in each basin by name, and histories.
 
     Histories are those of the seeds drawn individually and of these first ones.
     """
     method = case.study.shown_method.name
     found = read_identifications(identifications, case, method)
-    first = first_of_basins(found, case.study.near_noise_tolerance)
-    shown = [int(run["seed"]) for run in first.values()]
-    history = read_histories(histories, method, values)
-    drawn = history["seed"].isin({*range(SHOWN_SEEDS), *shown})
-    return found, list(first), shown, history[drawn]
+    runs = first_of_basins(found, case.study.near_noise_tolerance)
+    first = {words: int(run["seed"]) for words, run in runs.items()}
+    histories = read_histories(history, method, values)
+    drawn = histories["seed"].isin({*range(SHOWN_SEEDS), *first.values()})
+    return found, first, histories[drawn]
 
 
-def draw_convergence(case: Case, identifications: Path, histories: Path) -> Figure:
+def draw_convergence(case: Case, identifications: Path, history: Path) -> Figure:
     """Draw each seed's excess of the misfit over its noise, highlighting a run of each basin."""
     method, tolerance = case.study.shown_method, case.study.near_noise_tolerance
-    found, first, shown, history = _runs(case, identifications, histories, ["best_misfit"])
+    found, first, histories = _runs(case, identifications, history, ["best_misfit"])
     noise = found.set_index("seed")["noise_rms"]
     noisy = bool((noise > 0).all())
     unit = noise if noisy else pd.Series(found["misfit"].min(), index=noise.index)
     drawn = style.figure(style.COLUMN_IN, 2.9)
     axes = drawn.subplots()
-    for seed, rows in history.groupby("seed"):
+    for seed, rows in histories.groupby("seed"):
         excess = 100 * (rows["best_misfit"] / unit[seed] - 1)
-        axes.plot(rows["generation"], excess, **_line_of_seed(seed, shown, 0.7))
+        axes.plot(rows["generation"], excess, **_line_of_seed(seed, first, 0.7))
     _name_seeds(axes, len(found), first)
     label = "noise in the trace" if noisy else "lowest misfit"
     axes.axhline(0, color=style.TARGET, linestyle="--", linewidth=0.8, label=label)
-    last = int(history["generation"].max())
+    last = int(histories["generation"].max())
     if "genetic_algorithm" in method.blocks:
         mutation_start = case.block.genetic_algorithm.mutation_start
         if mutation_start <= last:
@@ -104,7 +104,6 @@ def draw_convergence(case: Case, identifications: Path, histories: Path) -> Figu
 
 
 def _mark_mutation(axes: Axes, start: int, last: int) -> None:
-    """Mark the generation in which mutation starts, with a label below the curves."""
     axes.axvline(start, color=style.TARGET, linestyle=":", linewidth=0.8)
     before = start > last / 2
     axes.annotate(
@@ -119,26 +118,27 @@ def _mark_mutation(axes: Axes, start: int, last: int) -> None:
     )
 
 
-def draw_evolution(case: Case, identifications: Path, histories: Path) -> Figure:
+def draw_evolution(case: Case, identifications: Path, history: Path) -> Figure:
     """Draw every parameter over generations for all seeds, highlighting a run of each basin."""
     parameters, identified = case.sample.model.parameters, case.published.identified
     columns = [parameter.column for parameter in parameters]
-    found, first, shown, history = _runs(case, identifications, histories, columns)
-    drawn = style.figure(style.COLUMN_IN, 1.2 + 1.5 * (rows := -(-len(parameters) // 2)))
-    grid = drawn.subplots(rows, 2, sharex=True).ravel()
+    found, first, histories = _runs(case, identifications, history, columns)
+    down = -(-len(parameters) // 2)
+    drawn = style.figure(style.COLUMN_IN, 1.2 + 1.5 * down)
+    grid = drawn.subplots(down, 2, sharex=True).ravel()
     for axes, parameter in zip(grid, parameters, strict=False):
-        for seed, rows in history.groupby("seed"):
-            look = _line_of_seed(seed, shown, 0.6)
+        for seed, rows in histories.groupby("seed"):
+            look = _line_of_seed(seed, first, 0.6)
             axes.step(rows["generation"], rows[parameter.column], where="post", **look)
         target = case.parameters.get(parameter.name, 0)
         if target > 0:
             axes.axhline(target, color=style.TARGET, linestyle="--")
         if parameter.name in identified:
             axes.axhline(identified[parameter.name], color=style.PAPER, linestyle=":")
-        if np.any(history[parameter.column] > 0):
+        if np.any(histories[parameter.column] > 0):
             axes.set_yscale("log")
         axes.set_ylabel(with_unit(parameter.symbol, parameter.unit))
-        axes.set_xlim(0, history["generation"].max())
+        axes.set_xlim(0, histories["generation"].max())
     for axes in grid[len(parameters) :]:
         axes.set_axis_off()
     for axes in grid[len(parameters) - 2 : len(parameters)]:
@@ -215,7 +215,8 @@ def draw_scatter(
         if {p.name for p in names} <= {*(printed := case.published.identified)}:
             ratio = np.clip(sum(printed[p.name] for p in names) / value, *axes.get_ylim())
             axes.axhline(ratio, color=style.PAPER, linewidth=1.2, linestyle=(0, (4, 2)))
-        style.panel(axes, "abcdefghijklmnopqrstuvwxyz"[index], _title(quantity, known, verdict), 60)
+        said = f"{100 * known:.2g} %" if np.isfinite(known) else verdict.split(" above")[0]
+        style.panel(axes, ascii_letters[index], f"{quantity.symbol}: {said}", 60)
         if index == 0:
             axes.set_ylabel("identified / target")
     _legend(drawn, case, list(found["method"].unique()), found["seed"].nunique())
@@ -258,11 +259,6 @@ def _quantity(
         axes.yaxis.set_major_locator(MaxNLocator(5))
     axes.set(ylim=(bottom, top), xlim=(-0.6, len(names) - 0.4))
     axes.set_xticks([])
-
-
-def _title(quantity: Quantity, limit: float, verdict: str) -> str:
-    known = f"{100 * limit:.2g} %" if np.isfinite(limit) else verdict.split(" above")[0]
-    return f"{quantity.symbol}: {known}"
 
 
 def _legend(drawn: Figure, case: Case, methods: list[str], seeds: int) -> None:

@@ -112,18 +112,17 @@ def seeds_in_words(count: int) -> str:
 
 
 def scale_of(values: Array, unit: str) -> tuple[float, str]:
-    """Return factor and unit that put values between 1 and 1000, e.g. ``(1e6, "µrad")``."""
+    """Return factor and unit that put values between 1 and 1000, e.g. ``(1e6, "µrad")``.
+
+    A unit that is no single word, as N/m, has no prefix.
+    """
+    if not unit.isalpha():
+        return 1.0, unit
     largest = float(np.max(np.abs(values)))
     for factor, prefix in ((1.0, ""), (1e3, "m"), (1e6, "µ")):
         if largest * factor >= 1:
             return factor, prefix + unit
     return 1e9, f"n{unit}"
-
-
-def scale_of_fit(fit: Fit) -> tuple[float, str]:
-    """Return factor and unit with a prefix, where the unit of the readings may have one."""
-    plain = fit.read.unit.isalpha()
-    return scale_of(fit.fitted, fit.read.unit) if plain else (1.0, fit.read.unit)
 
 
 _READINGS: dict[str, Any] = {"linestyle": "", "marker": ".", "markersize": 1.2, "rasterized": True}
@@ -140,10 +139,10 @@ def draw_fits(
 
 
 def draw_judged_fit(
-    case: Case, verdicts: Path, measurements: Path, calibrated: list[Path]
+    case: Case, verdicts: Path, measurements: list[Path], calibrated: list[Path]
 ) -> Figure:
     """Draw the judged trace of a case and its best fit."""
-    fit = judged_fit(case, read_verdicts(verdicts), measurements, calibrated)
+    fit = judged_fit(case, read_verdicts(verdicts), measurements[0], calibrated)
     trace = "recorded trace" if case.recorded else f"seed {TRACE}"
     return draw_fit({f"best fit ({trace})": fit}, case.title, case.published.axis_rad)
 
@@ -161,7 +160,7 @@ def judged_fit(
 def draw_traces(axes: Axes, fits: Mapping[str, Fit]) -> tuple[float, str]:
     """Draw a trace, its target, its fit and others, by label; return factor and unit."""
     fit = next(iter(fits.values()))
-    factor, unit = scale_of_fit(fit)
+    factor, unit = scale_of(fit.fitted, fit.read.unit)
     axes.plot(fit.time_s, factor * fit.measured, color=style.MEASURED, **_readings(len(fit.time_s)))
     kind = "recorded trace" if fit.target is None else "noisy measurement"
     axes.plot([], [], ".", color=style.MEASURED, markersize=4, label=kind)
@@ -181,7 +180,6 @@ def _readings(count: int) -> dict[str, Any]:
 
 
 def _means(axes: Axes, time_s: Array, residual: Array) -> None:
-    """Draw means of a long trace's residuals, each with its standard error."""
     if len(residual) <= _FEW:
         return
     times, parts = np.array_split(time_s, _PARTS), np.array_split(residual, _PARTS)

@@ -27,10 +27,10 @@ from biogrip.tables.cases import target_of
 _HIGHEST_INCREASE, _WIDE = 12.0, 5.0
 
 
-def draw_profiles(case: Case, measured: Path, expected: list[Path]) -> Figure:
+def draw_profiles(case: Case, verdicts: Path, expected: list[Path]) -> Figure:
     """Draw the profile of every quantity of a case, with confidence limits."""
     others = [read_verdicts(path) for path in expected]
-    return draw_profiles_of(read_verdicts(measured), others, case.title, case.parameters)
+    return draw_profiles_of(read_verdicts(verdicts), others, case.title, case.parameters)
 
 
 def draw_profiles_of(
@@ -149,9 +149,9 @@ _TRUE = _POINTS | {
 }  # fmt: skip
 
 
-def draw_valley(case: Case, measured: Path, identifications: Path) -> Figure:
+def draw_valley(case: Case, verdicts: Path, identifications: Path) -> Figure:
     """Draw the increase of chi-squared over the two exchangeable dampers of a case."""
-    found = read_verdicts(measured)
+    found = read_verdicts(verdicts)
     valley = found["valley"]
     x, y = valley["x"], valley["y"]
     identified = read_identifications(identifications, case, case.study.fitting_method.name)

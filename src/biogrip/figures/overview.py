@@ -98,7 +98,6 @@ def draw_overview(
 def _scatter(
     axes: Axes, case: Case, found: pd.DataFrame, tolerance: float, bounded: set[str]
 ) -> None:
-    """Draw identified over target values of the quantities that are bounded."""
     reached = near_noise(found, tolerance)
     identified = case.published.identified
     ticks: list[str] = []
@@ -167,7 +166,6 @@ def draw_answer(case: Case, verdicts: Path, measurements: Path, calibrated: list
 
 
 def _device(axes: Axes) -> None:
-    """Draw two arms with a sample between their tips, not to scale."""
     axes.add_patch(Circle((0, 3.0), 0.34, color=style.ORANGE))
     for side in (-1, 1):
         axes.plot([side * 1.2, side * 0.32], [0, 3.1], color=style.BLUE, linewidth=4)
@@ -292,6 +290,12 @@ _RATIO_TICKS = (0.5, 1, 2, 5, 10, 20, 50, 100)
 _WITHOUT_BOUND = "#dddddd"
 
 
+def save_robustness(study: Study, sweep: str, points: Path, figure: list[Path]) -> None:
+    """Draw a sweep, see `draw_robustness`, and write the figure."""
+    with style.styled():
+        style.save(draw_robustness(study, sweep, points), *figure)
+
+
 def draw_robustness(study: Study, name: str, points: Path) -> Figure:
     """Draw shares in the true basin, and errors of the best and the worst determined quantity.
 
@@ -341,7 +345,6 @@ def draw_robustness(study: Study, name: str, points: Path) -> Figure:
 
 
 def _grid(sweep: SweepBlock, points: pd.DataFrame, column: str) -> Array:
-    """Return a column's values as a grid, (n_rows, n_columns)."""
     wide = points.pivot_table(index="row", columns="column", values=column, dropna=False)
     rows, columns = ([level.shown for level in axis.levels] for axis in (sweep.rows, sweep.columns))
     return wide.reindex(index=rows, columns=columns).to_numpy(float)

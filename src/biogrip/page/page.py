@@ -12,6 +12,7 @@ from typing import Any
 
 import jinja2
 import PIL.Image
+import yaml
 
 from biogrip import __version__
 from biogrip.digits import legible, significant, with_unit
@@ -98,51 +99,59 @@ class Entry:
 
 
 def write_report(
-    study: Study, config: str, files: Mapping[str, list[Path]], page: Path, front: Path
+    study: Study,
+    captions: list[Path],
+    figures: list[Path],
+    tables: list[Path],
+    downloads: list[Path],
+    verdicts: list[Path],
+    measurements: list[Path],
+    page: Path,
+    front: Path,
 ) -> None:
-    """Write the report of a study, with its config, YAML, as HTML, and its answers alone.
+    """Write the report of a study as HTML, and its answers alone.
 
-    Files are, by what they have: `figures`, PNG; `tables`, HTML, and in their order their
-    `downloads`, CSV; `captions`, text, named like what they are of; of all cases in their order
-    `verdicts` and `measurements` with the judged trace.
+    Captions are text, named like what they are of; figures are PNG, tables HTML, downloads the same
+    tables as CSV. Verdicts and measurements with the judged trace are those of all cases in their
+    order.
     """
     texts = {
         (path.parent.name, path.stem): " ".join(path.read_text(encoding="utf-8").split())
-        for path in files["captions"]
+        for path in captions
     }
     titles = {case.name: case.title for case in study.cases.values()}
     owners = titles | {name: sweep.title or name for name, sweep in study.config.sweeps.items()}
     cases = list(study.cases.values())
-    measured = zip(cases, files["measurements"], strict=True)
+    measured = zip(cases, measurements, strict=True)
     movable = [(case, of) for case, of in measured if study.published and has_sliders(case)]
     # Where the branch relaxes fastest, its damper and the parallel one are told apart least.
     movable.sort(key=lambda it: it[0].parameters["c"] / it[0].parameters["k"])
     errors, judged, covered, compared, claimed, beside, models = (
-        [row for csv in files["downloads"] if csv.name.startswith(name) for row in read_table(csv)]
+        [row for csv in downloads if csv.name.startswith(name) for row in read_table(csv)]
         for name in _ANSWERING
     )
-    tables: list[Entry] = []
-    for path, csv in zip(files["tables"], files["downloads"], strict=True):
+    listed: list[Entry] = []
+    for path, csv in zip(tables, downloads, strict=True):
         entry, download = entry_of(path, owners, texts), data_url("text/csv", whole(csv).encode())
-        if entry.caption in (it.caption for it in tables):
+        if entry.caption in (it.caption for it in listed):
             entry = replace(entry, caption="")
-        tables.append(replace(entry, content=_table(path, titles), download=download))
-    figures = [
+        listed.append(replace(entry, content=_table(path, titles), download=download))
+    drawn = [
         replace(entry_of(path, owners, texts), content=image, size=size)
-        for path, (image, size) in zip(files["figures"], _images(files["figures"]), strict=True)
+        for path, (image, size) in zip(figures, _images(figures), strict=True)
     ]
     if study.published:
-        story = _as_in_paper(figures, [study.cases[name] for name in study.published])
+        story = _as_in_paper(drawn, [study.cases[name] for name in study.published])
     else:
-        figures, tables = ([it for it in own if _is_own(it, study)] for own in (figures, tables))
-        story = [it for it in figures if it.name in _UNFOLDED]
-    told = [replace(it, title="What a trace tells") for it in figures if it.name == "answer"]
+        drawn, listed = ([it for it in own if _is_own(it, study)] for own in (drawn, listed))
+        story = [it for it in drawn if it.name in _UNFOLDED]
+    told = [replace(it, title="What a trace tells") for it in drawn if it.name == "answer"]
     placed = {entry.file for entry in told + story}
     folded: dict[str, list[Entry]] = {}
-    for entry in figures:
+    for entry in drawn:
         if entry.file not in placed:
             folded.setdefault(owners.get(entry.whose, "The study"), []).append(entry)
-    found = [*zip(cases, map(read_verdicts, files["verdicts"]), strict=True)]
+    found = [*zip(cases, map(read_verdicts, verdicts), strict=True)]
     own = [it for case, it in found if case.recorded and not study.published]
     asked = compared, study.shown_method.title
     who = "Run again, the paper's" if study.published else "The"
@@ -169,9 +178,12 @@ def write_report(
         "told": told,
         "story": story,
         "folded": folded,
-        "evidence_tables": [it for it in tables if it.name in _EVIDENCE],
-        "tables": [it for it in tables if it.name not in _EVIDENCE],
-        "config": config,
+        "evidence_tables": [it for it in listed if it.name in _EVIDENCE],
+        "tables": [it for it in listed if it.name not in _EVIDENCE],
+        # But for what changes no result.
+        "config": yaml.safe_dump(
+            {key: value for key, value in study.plain.items() if key != "pdf"}, allow_unicode=True
+        ),
         "title": _QUESTION if study.published else named,
         "paper": bool(study.published),
         "versions": {"biogrip": __version__, **{name: version(name) for name in _LIBRARIES}},

@@ -6,7 +6,7 @@ other readings of the paper.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import NormalDist
@@ -16,6 +16,7 @@ import numpy as np
 
 from biogrip.arrays import Array, BoolArray
 from biogrip.digits import significant
+from biogrip.fit.experiment import Experiment
 from biogrip.fit.problem import Fit
 from biogrip.physics.sample_model import SINGLE_BRANCH, Parameter, SampleModel
 from biogrip.records.rows import (
@@ -35,8 +36,6 @@ if TYPE_CHECKING:
 # Few enough that results on different processors agree.
 _DIGITS = 8
 
-LEADING = ("case", "method", "seed")
-TRAILING = ("misfit", "noise_rms", "generations", "evaluations", "stop_reason")
 ENCODABLE = "encodable_misfit"
 """Last column of the identifications of a case: lowest misfit that genes can encode of the
 trace, see `lowest_encodable`; empty if it was recorded."""
@@ -89,7 +88,11 @@ def parameters_in_file(model: SampleModel) -> tuple[Parameter, ...]:
 
 def columns(model: SampleModel) -> tuple[str, ...]:
     """Return the columns of a file of identifications."""
-    return (*LEADING, *(p.column for p in parameters_in_file(model)), *TRAILING)
+    return (
+        *("case", "method", "seed"),
+        *(p.column for p in parameters_in_file(model)),
+        *("misfit", "noise_rms", "generations", "evaluations", "stop_reason"),
+    )
 
 
 @dataclass(frozen=True)
@@ -98,11 +101,7 @@ class Record:
 
     case: str
     method: str
-    model: SampleModel
-    searched: SampleModel
-    """The model without fixed parameters."""
-    fixed: Mapping[str, float]
-    """Values of fixed parameters by name."""
+    experiment: Experiment
     seed: int
     """Seed of the trace."""
     answer: Fit
@@ -111,8 +110,9 @@ class Record:
 
     def by_column(self, identified: Array) -> dict[str, Any]:
         """Return identified values, (n_searched, ...), fixed ones, and 0 for missing elements."""
-        values = {**self.fixed, **dict(zip(self.searched.names, identified, strict=True))}
-        return {p.column: values.get(p.name, 0.0) for p in parameters_in_file(self.model)}
+        of = self.experiment
+        values = {**of.fixed, **dict(zip(of.searched.names, identified, strict=True))}
+        return {p.column: values.get(p.name, 0.0) for p in parameters_in_file(of.model)}
 
 
 def write_identifications(path: Path, records: list[Record]) -> None:
@@ -131,7 +131,7 @@ def write_identifications(path: Path, records: list[Record]) -> None:
         )
         for record in records
     )
-    write_rows(path, columns(records[0].model), rows)
+    write_rows(path, columns(records[0].experiment.model), rows)
 
 
 def write_histories(path: Path, records: list[Record]) -> None:

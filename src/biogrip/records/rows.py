@@ -41,10 +41,6 @@ AGAIN = "It is damaged: delete it, and the same command makes it again."
 """What to do about a result that is not as it was written."""
 
 
-DIGEST = "digest"
-"""Key of a JSON file, see `write_object`."""
-
-
 @dataclass(frozen=True)
 class RowFile:
     """A kind of CSV file."""
@@ -148,23 +144,15 @@ def require_rows(
     raise BiogripError(f"{path}: found {len(found)} rows, wanted {len(known)}{text}. {AGAIN}")
 
 
-def read_rows(path: Path, columns: Sequence[str] | None = None) -> list[list[str]]:
-    """Read the header, which may have to be given columns, and all rows as text.
-
-    Without columns the file is a user's, see `whole`.
-    """
-    text = whole(path, again="" if columns is None else f" {AGAIN}")
-    rows = [[*map(as_it_was, row)] for row in csv.reader(StringIO(text, newline=""))]
-    if columns is not None and rows[0] != list(columns):
-        found, wanted = ",".join(rows[0]), ",".join(columns)
-        raise BiogripError(f"{path}, line 1: found {found}; wanted {wanted}.")
-    return rows
+def read_rows(path: Path, again: str = "") -> list[list[str]]:
+    """Read the header and all rows of a file, by default a user's, as text, see `whole`."""
+    text = whole(path, again=again)
+    return [[*map(as_it_was, row)] for row in csv.reader(StringIO(text, newline=""))]
 
 
 def read_table(path: Path) -> list[dict[str, str]]:
     """Read the rows of a table as text by column."""
-    whole(path)
-    header, *rows = read_rows(path)
+    header, *rows = read_rows(path, f" {AGAIN}")
     return [dict(zip(header, row, strict=True)) for row in rows]
 
 
@@ -195,14 +183,14 @@ def join_arrays(several: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
 
 def write_object(path: Path, plain: Mapping[str, Any], made_from: str = "") -> None:
     """Write plain data as JSON, with a digest of them and of what they were made from."""
-    write_text(path, json.dumps({**plain, DIGEST: _digest(plain, made_from)}, indent=1) + "\n")
+    write_text(path, json.dumps({**plain, "digest": _digest(plain, made_from)}, indent=1) + "\n")
 
 
 def read_object(path: Path, kind: str, made_from: str = "") -> dict[str, Any]:
     """Read what `write_object` wrote; a `BiogripError` says that it is something else."""
     try:
         found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        if found.pop(DIGEST) == _digest(found, made_from):
+        if found.pop("digest") == _digest(found, made_from):
             return found
         problem = "its digest is another one"
     except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:

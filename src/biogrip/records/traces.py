@@ -79,11 +79,6 @@ def write_target(
     write_rows(path, columns, rows)
 
 
-def as_written(readings: Array) -> Array:
-    """Return a rotation rounded like a target that was written and read."""
-    return np.array([float(_WRITTEN.format(value)) for value in readings])
-
-
 def read_target(path: Path, times_s: Array) -> tuple[Array, Array, Array]:
     """Read time, what is controlled and what is read of a target, of just the times given, (n,)."""
     # Without pandas, which most jobs that read a target do not import.

@@ -32,7 +32,7 @@ from biogrip.records.identifications import (
 from biogrip.records.rows import (
     join_arrays,
     read_arrays,
-    read_rows,
+    read_table,
     write_arrays,
     write_rows,
 )
@@ -62,7 +62,6 @@ def identify(
     recorded = read_measurements(measurements, list(seeds))
     experiment = experiment_for(case.experiment, recorded, calibrated).to_identify()
     progress = Progress(f"{case.name}, {method}", len(seeds))
-    whose = case.name, method, experiment.model, experiment.searched, experiment.fixed
     records = []
     for group in groups(seeds):
         traces = [recorded.readings[seed] for seed in group]
@@ -71,7 +70,7 @@ def identify(
         answers = identified(problems, rngs, progress.within)
         for seed, trace, answer in zip(group, traces, answers, strict=True):
             noise = None if recorded.target is None else rms(trace - recorded.target)
-            records.append(Record(*whose, seed, answer, noise))
+            records.append(Record(case.name, method, experiment, seed, answer, noise))
         progress.done(len(group))
     write_identifications(parameters, records)
     write_histories(history, records)
@@ -80,24 +79,23 @@ def identify(
 def join(
     case: Case,
     batches: list[Path],
-    history_batches: list[Path],
+    histories: list[Path],
     measurements: list[Path],
     calibrated: list[Path],
-    parameters: Path,
+    identifications: Path,
     history: Path,
 ) -> None:
     """Join the batches of all methods, and add the lowest encodable misfit of each trace.
 
     It is looked for around the end of every run, since these surround the continuous optimum.
     """
-    header = columns(case.sample.model)
     for batch in batches:
         read_batch(batch, case)
-    rows = [row for batch in batches for row in read_rows(batch, header)[1:]]
+    rows = [row for batch in batches for row in read_table(batch)]
     searched = case.experiment.searched.parameters
     ends = defaultdict(list)
     for row in rows:
-        ends[row[2]].append([float(row[header.index(p.column)]) for p in searched])
+        ends[row["seed"]].append([float(row[p.column]) for p in searched])
     lowest: dict[str, str] = {}
     for file in measurements:
         recorded = read_measurements(file)
@@ -108,8 +106,10 @@ def join(
         for seed, of_trace in zip(map(str, traces), posed, strict=True):
             misfit = lowest_encodable(of_trace.residuals.misfit, ranges, np.array(ends[seed]))
             lowest[seed] = f"{misfit:.6e}"
-    write_rows(parameters, (*header, ENCODABLE), ([*row, lowest.get(row[2], "")] for row in rows))
-    write_arrays(history, join_arrays([read_arrays(batch) for batch in history_batches]))
+    header = columns(case.sample.model)
+    joined = ([*map(row.get, header), lowest.get(row["seed"], "")] for row in rows)
+    write_rows(identifications, (*header, ENCODABLE), joined)
+    write_arrays(history, join_arrays([read_arrays(batch) for batch in histories]))
 
 
 def fit(

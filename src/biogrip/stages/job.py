@@ -4,7 +4,8 @@ A rule's ``params`` are some keys of the config as plain values, those of its ca
 study's (`settings`). Its script makes a `Case` or a `Study` of these again (`job_case`,
 `job_study`), in which every other key is an error: a rule that forgets to name one fails, and
 cannot give a result that Snakemake would not renew. Each job has a batch of the case's seeds
-(`batch_names`), does a stage (`run`), and writes what it says to its log (`logged`).
+(`batch_names`), calls functions with its files (`arguments`), and writes what it says to its log
+(`logged`).
 """
 
 import traceback
@@ -167,22 +168,26 @@ def job_settings(job: Any) -> dict[str, Any]:
     return given
 
 
-def run(job: Any, stage: Callable[..., None]) -> None:
-    """Do a stage, whose arguments have the names of wildcards and files of a job's rule.
+def arguments(job: Any, function: Callable[..., object]) -> dict[str, Any]:
+    """Return what a function takes: params, wildcards and files of a job's rule, by their names.
 
-    ``case`` is the case, and ``seeds`` are those of the batch.
+    ``case`` is the case, ``study`` the study, and ``seeds`` are those of the batch.
     """
-    of_job = (dict(of.items()) for of in (job.wildcards, job.input, job.output))
+    of_job = job.params, job.wildcards, job.input, job.output
     given: dict[str, Any] = {name: it for of in of_job for name, it in of.items()}
-    for name, kind in get_type_hints(stage).items():
-        if kind is Path:
+    given["seeds"] = [*seeds_of(given.get("batch", "seeds_0-0"))]
+    for name, kind in get_type_hints(function).items():
+        if kind is Case:
+            given[name] = job_case(job)
+        elif kind is Study:
+            given[name] = job_study(job)
+        elif kind is Path:
             (given[name],) = paths(given[name])
         elif kind == list[Path]:
             given[name] = paths(given[name])
-    given |= {"case": job_case(job), "seeds": [*seeds_of(given.get("batch", "seeds_0-0"))]}
-    stage(**{name: given[name] for name in signature(stage).parameters})
+    return {name: given[name] for name in signature(function).parameters}
 
 
 def paths(files: Any) -> list[Path]:
     """Return files of Snakemake as paths; one file is a list of one."""
-    return [Path(files)] if isinstance(files, str) else [Path(file) for file in files]
+    return [Path(files)] if isinstance(files, str | Path) else [Path(file) for file in files]

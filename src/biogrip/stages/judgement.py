@@ -12,7 +12,7 @@ bound assumes. Some seeds get a full verdict as well, as users are shown it: mul
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -105,12 +105,6 @@ def estimate(
 
     The noise of a seed is that of its measurement.
     """
-    INTERVALS.write(intervals, _rows(case, seeds, target, expected, calibrated))
-
-
-def _rows(
-    case: Case, seeds: Sequence[int], target: Path, expected: Path, calibrated: list[Path]
-) -> Iterator[tuple[str | int, ...]]:
     experiment = case.judged_experiment.calibrated(calibrated)
     time_s, _, rotation = read_target(target, case.times_s)
     found = read_verdicts(expected)["quantities"]
@@ -119,6 +113,7 @@ def _rows(
     selected = [index for index, quantity in enumerate(every) if quantity.label in determined]
     rest_known, informed, truth = _rest_known(case, experiment, time_s, rotation)
     progress = Progress(f"{case.name}, intervals", len(seeds))
+    rows: list[tuple[Any, ...]] = []
     for group in groups(seeds, _TIMES):
         rngs = [experiment.stream("noise", seed) for seed in group]
         traces = [add_noise(rotation, case.noise, rng, time_s) for rng in rngs]
@@ -131,18 +126,23 @@ def _rows(
         if len(informed):
             simpler = experiment.of_each(time_s, traces, rest_known)
             known[:, informed] = fit_from(simpler, truth[informed]).x
-        judged = _judged(fits, every, selected, group, case)
-        for index, seed in enumerate(group):
-            in_full = seed % case.block.identifiability.verdicts_every == 0
-            shown = range(len(every)) if in_full else selected
-            findings = judged[index].findings if index in judged else []
-            for which, finding in zip(shown, findings, strict=True):
-                given = (finding, known[index]) if which in selected else None
-                texts = _estimates(every[which], judged[index].likelihood.best, given)
-                limits = ("" if it is None else f"{it:.5g}" for it in (finding.low, finding.high))
-                verdict = (finding.verdict, *limits) if in_full else ("", "", "")
-                yield case.name, every[which].label, seed, *texts, *verdict
+        for in_full, shown in ((True, [*range(len(every))]), (False, selected)):
+            often = case.block.identifiability.verdicts_every
+            some = [i for i, seed in enumerate(group) if (seed % often == 0) == in_full]
+            if not (some and shown):
+                continue
+            quantities = [every[which] for which in shown]
+            judged = judge_quantities([fits[i] for i in some], quantities, case.confidence)
+            for i, diagnosis in zip(some, judged, strict=True):
+                for which, finding in zip(shown, diagnosis.findings, strict=True):
+                    given = (finding, known[i]) if which in selected else None
+                    texts = _estimates(every[which], diagnosis.likelihood.best, given)
+                    ends = finding.low, finding.high
+                    limits = ("" if end is None else f"{end:.5g}" for end in ends)
+                    verdict = (finding.verdict, *limits) if in_full else ("", "", "")
+                    rows.append((case.name, every[which].label, group[i], *texts, *verdict))
         progress.done(len(group))
+    INTERVALS.write(intervals, sorted(rows, key=lambda row: row[2]))
 
 
 def _rest_known(
@@ -156,27 +156,6 @@ def _rest_known(
     names = experiment.searched.names
     given = {name: case.parameters[name] for i, name in enumerate(names) if i not in informed}
     return with_fixed(experiment.searched, given), informed, truth
-
-
-def _judged(
-    fits: Sequence[TraceFit],
-    every: Sequence[Quantity],
-    selected: Sequence[int],
-    group: Sequence[int],
-    case: Case,
-) -> dict[int, Diagnosis]:
-    """Judge, by index, the selected quantities of traces, and all of those with a full verdict."""
-    judged: dict[int, Diagnosis] = {}
-    for full, shown in ((True, every), (False, [every[index] for index in selected])):
-        some = [
-            i
-            for i, seed in enumerate(group)
-            if (seed % case.block.identifiability.verdicts_every == 0) == full
-        ]
-        if some and shown:
-            found = judge_quantities([fits[index] for index in some], shown, case.confidence)
-            judged.update(zip(some, found, strict=True))
-    return judged
 
 
 def judge_quantities(

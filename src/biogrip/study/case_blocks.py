@@ -256,7 +256,6 @@ class CaseBlock(Shared):
             yield ("measurement", "rate_Hz"), text
 
     def _sampling_complaints(self) -> Iterator[Complaint]:
-        """Find too few or too many samples."""
         measured = self.measurement
         samples = self.protocol.end_s * measured.rate_Hz + 1
         needed = len(self.searched) + measured.fits_offset + measured.fits_drift + 1

@@ -208,7 +208,6 @@ def name_complaints(sweeps: Mapping[str, SweepBlock], cases: Iterable[str]) -> I
 
 
 def _word(value: float | str) -> str:
-    """Return a value as text that is safe in file names."""
     text = value if isinstance(value, str) else f"{value:.15g}"
     return re.sub(r"[^A-Za-z0-9-]+", "_", text)
 

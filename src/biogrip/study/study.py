@@ -184,10 +184,11 @@ class Case:
         if isinstance(assumed, Mapping):
             gripper = built(Gripper, overlaid(plain(gripper), assumed))
         uncertainty = self.block.gripper.uncertainty if self.instrument.has_jaws else None
+        ranges, usual = dict[str, GeneRange](vars(self.block.search_range)), default_ranges()
         return Experiment(
             gripper,
             self.phases,
-            dict[str, GeneRange](vars(self.block.search_range)),
+            ranges,
             self.sample,
             self.fixed,
             self.instrument,
@@ -200,16 +201,10 @@ class Case:
             fit_start=measurement.fit_start,
             record=self.record,
             undeclared=measurement.undeclared,
-            given_ranges=self._given_ranges,
+            given_ranges=frozenset(name for name, it in ranges.items() if it != usual[name]),
             simulated=not self.recorded,
             name=self.name,
         )
-
-    @property
-    def _given_ranges(self) -> frozenset[str]:
-        """Names of search ranges that are not the default study's: those that the user gave."""
-        given = vars(self.block.search_range)
-        return frozenset(name for name, it in default_ranges().items() if it != given[name])
 
     @property
     def judged_experiment(self) -> Experiment:
@@ -413,7 +408,6 @@ def load_study(
 
 
 def _refuse(complaints: Iterable[Complaint], sources: Sequence[Source]) -> None:
-    """Raise an error that lists the first few complaints, if there are any."""
     found: dict[str, None] = {}
     for path, text in complaints:
         # A complaint in a block that cases inherit is reported once, not once per case.

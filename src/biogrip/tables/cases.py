@@ -25,13 +25,11 @@ from biogrip.records.identifications import (
     share_with_limits,
 )
 from biogrip.study.study import Case, Study
-from biogrip.tables.layout import Column, Row, ShownTable
+from biogrip.tables.layout import Column, Row, ShownTable, titled, write
 
 _PERCENTILES = {"p05": 5, "p25": 25, "median": 50, "p75": 75, "p95": 95}
 _COLUMNS = (
-    Column("case", "Case"),
-    Column("parameter", "Parameter"),
-    Column("unit", "Unit"),
+    *titled("case", "parameter", "unit"),
     Column("target", "Target", 4),
     Column("paper_identified", "Paper", 4),
     Column("paper_error_percent", "Paper error %", 2),
@@ -54,6 +52,19 @@ def _columns(near_noise_tolerance: float) -> tuple[Column, ...]:
     share = f"Share {near_noise_words(near_noise_tolerance)}"
     ends = (Column(f"near_noise_{end}", f"95 % {end}", 2) for end in ("from", "to"))
     return (*_COLUMNS, Column("near_noise_share", share, 2), *ends)
+
+
+def write_tables(
+    case: Case,
+    identifications: Path,
+    judged: Path,
+    expected: list[Path],
+    errors: Path,
+    verdicts: Path,
+) -> None:
+    """Write the tables of a case: its errors and its verdicts."""
+    write(errors_of_case(case, identifications), errors)
+    write(verdicts_of_case(case, judged, expected), verdicts)
 
 
 def errors_of_case(case: Case, identifications: Path) -> ShownTable:
@@ -125,12 +136,9 @@ def errors(study: Study, identifications: list[Path]) -> ShownTable:
 
 
 _VERDICT_COLUMNS = (
-    Column("case", "Case"),
-    Column("quantity", "Quantity"),
-    Column("unit", "Unit"),
+    *titled("case", "quantity", "unit"),
     Column("target", "Target", 4),
-    Column("fit", "Fit"),
-    Column("verdict", "Verdict"),
+    *titled("fit", "verdict"),
     Column("value", "Estimate", 3),
     Column("low", "{percent} from", 3),
     Column("high", "{percent} to", 3),
@@ -141,7 +149,7 @@ _VERDICT_COLUMNS = (
 )
 
 
-def verdicts(case: Case, measured: Path, expected: list[Path]) -> ShownTable:
+def verdicts_of_case(case: Case, measured: Path, expected: list[Path]) -> ShownTable:
     """List the verdicts on all quantities of a case, and those expected, where there are any."""
     found, others = read_verdicts(measured), [read_verdicts(path) for path in expected]
     foreseen_of = {item["quantity"]: item for item in others[0]["quantities"]} if others else {}
@@ -182,20 +190,13 @@ def target_of(quantity: str, parameters: Mapping[str, float]) -> float | None:
     return sum(parameters[name] for name in names) if set(names) <= set(parameters) else None
 
 
-Interval = tuple[float, float]
-"""Lowest and highest number."""
+def interval_of(
+    printed: float, target: float | None, error_percent: str | None
+) -> tuple[float, float]:
+    """Return the ends of the numbers that are printed so with this error, rounded or cut off.
 
-
-def interval_of_value(printed: float) -> Interval:
-    """Return the numbers that are printed so, rounded or cut off after the last digit."""
-    (low, _), (_, high) = _ways(Decimal(f"{printed:.15g}"))
-    return float(low), float(high)
-
-
-def interval_of(printed: float, target: float | None, error_percent: str | None) -> Interval:
-    """Return the numbers that are printed so with this error, each rounded or cut off.
-
-    An error that is no number, or that no such number has, says nothing.
+    Without an error, or with one that is no number or that no such number has, the value alone
+    counts.
     """
     values = _ways(Decimal(f"{printed:.15g}"))
     found = []

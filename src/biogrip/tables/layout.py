@@ -49,6 +49,11 @@ class Column:
     """Significant digits of numbers in print."""
 
 
+def titled(*names: str) -> tuple[Column, ...]:
+    """Return columns whose headings are their names."""
+    return tuple(Column(name, name.capitalize()) for name in names)
+
+
 @dataclass(frozen=True)
 class ShownTable:
     """A table with caption, columns and rows."""
@@ -100,6 +105,11 @@ def convert(page: Path, ending: str) -> str:
     )
 
 
+def write_converted(page: Path, converted: Path) -> None:
+    """Write a table's HTML in the format that the name of a file says, see `convert`."""
+    write_text(converted, convert(page, converted.suffix))
+
+
 def as_published(table: Path) -> tuple[str, str]:
     """Return name and text under which a table is published: CSV as it is, HTML as Markdown."""
     if table.suffix == ".html":
@@ -122,8 +132,8 @@ def _without_bars(text: str) -> str:
     return _TAG.sub("&lt;", " ".join(text.splitlines())).replace("|", r"\|")
 
 
-def compare(published: Path, made: Sequence[Path]) -> str:
-    """Compare tables, CSV and HTML, with those that are published, and say how many agree.
+def compare(published: Path, made: list[Path]) -> None:
+    """Compare tables, CSV and HTML, with those that are published, and print how many agree.
 
     It is an error, which shows the lines that differ, if one has other bytes or is not published.
     """
@@ -143,4 +153,4 @@ def compare(published: Path, made: Sequence[Path]) -> str:
     if differing:
         shown = "\n".join(islice(differing, _MOST_LINES))
         raise BiogripError(f"the regenerated tables differ from {published}.\n{shown}")
-    return f"{counted(len(made), 'file')} of tables compared with {published}: the same bytes."
+    print(f"{counted(len(made), 'file')} of tables compared with {published}: the same bytes.")

@@ -26,12 +26,10 @@ from biogrip.records.rows import require_rows, seeds_of
 from biogrip.records.traces import read_target
 from biogrip.study.study import Case, Study
 from biogrip.tables.cases import error_percent, target_of
-from biogrip.tables.layout import Column, Row, ShownTable
+from biogrip.tables.layout import Column, Row, ShownTable, titled
 
 _METHOD_COLUMNS = (
-    Column("case", "Case"),
-    Column("method", "Method"),
-    Column("seeds", "Seeds"),
+    *titled("case", "method", "seeds"),
     Column("reached_share", "Share that reached the best encodable point", 2),
     Column("reached_low", "95 % from", 2),
     Column("reached_high", "95 % to", 2),
@@ -83,9 +81,7 @@ def methods(study: Study, identifications: list[Path]) -> ShownTable:
 
 
 _MODEL_COLUMNS = (
-    Column("case", "Case"),
-    Column("model", "Model"),
-    Column("parameters", "Parameters"),
+    *titled("case", "model", "parameters"),
     Column("median_delta_aic", "Median ΔAIC", 3),
     Column("median_delta_bic", "Median ΔBIC", 3),
     Column("chosen_by_aic", "Chosen by AIC"),
@@ -128,9 +124,7 @@ def read_fits(study: Study, path: Path) -> pd.DataFrame:
 
 
 _COLUMNS = (
-    Column("case", "Case"),
-    Column("quantity", "Quantity"),
-    Column("unit", "Unit"),
+    *titled("case", "quantity", "unit"),
     Column("target", "Target", 4),
     Column("bound_percent", "Cramér-Rao bound, rest known %", 3),
     Column("spread_percent", "Spread %", 3),
@@ -223,7 +217,6 @@ def read_intervals(study: Study, path: Path) -> pd.DataFrame:
 
 
 def _judged_seeds(study: Study) -> str:
-    """Return in words which seeds have verdicts."""
     every = {case.block.identifiability.verdicts_every for case in study.cases.values()}
     if len(every) > 1:
         return "some seeds"
@@ -268,12 +261,9 @@ def _holds(found: pd.DataFrame, truth: float, which: str = "") -> "pd.Series[boo
 
 
 _COUNT_COLUMNS = (
-    Column("case", "Case"),
-    Column("quantity", "Quantity"),
-    Column("unit", "Unit"),
+    *titled("case", "quantity", "unit"),
     Column("target", "Target", 4),
-    Column("verdict", "Verdict"),
-    Column("seeds", "Seeds"),
+    *titled("verdict", "seeds"),
     Column("reached", "With this verdict"),
     *(Column(f"reached_{end}_percent", f"{end.title()} %") for end in ("from", "to")),
     Column("narrow", f"Within a factor of {WIDE:g}"),
@@ -304,7 +294,6 @@ def verdict_counts(study: Study, intervals: list[Path]) -> ShownTable:
 
 
 def _counts(found: pd.DataFrame, target: float | None) -> Iterator[Row]:
-    """Yield a row for every verdict on a quantity."""
     for verdict, mine in found.groupby("verdict"):
         count = len(mine)
         row: Row = {"target": target, "verdict": verdict, "seeds": len(found), "reached": count}

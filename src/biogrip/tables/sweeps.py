@@ -5,6 +5,7 @@
 
 import math
 from collections.abc import Iterator, Mapping
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -18,9 +19,9 @@ from biogrip.physics.noise import rms
 from biogrip.physics.simulation import simulated_response
 from biogrip.records.identifications import near_noise, near_noise_words, read_batch
 from biogrip.records.rows import RowFile
-from biogrip.study.config import AxisBlock, Point
+from biogrip.study.config import AxisBlock
 from biogrip.study.study import Case, Study
-from biogrip.tables.layout import Column, Row, ShownTable
+from biogrip.tables.layout import Column, Row, ShownTable, write
 
 POINTS = RowFile(
     "a sweep",
@@ -49,35 +50,25 @@ def judge(
         files.setdefault((path.parts[-3], path.parts[-2]), []).append(path)
     calibrations = {path.stem: [path] for path in calibrated}
     block = study.config.sweeps[sweep]
-    each = (_rows(study, block.points(sweep, case), files, calibrations) for case in block.cases)
-    POINTS.write(points, (row for rows in each for row in rows))
-
-
-def _rows(
-    study: Study,
-    points: list[Point],
-    files: Mapping[tuple[str, str], list[Path]],
-    calibrations: Mapping[str, list[Path]],
-) -> Iterator[tuple[str | int, ...]]:
-    """Yield a row for every point of a case, method and quantity."""
-    true = study.cases[points[0].case].parameters
-    bounds = {}
-    for point in points:
-        case = study.points[point.name]
-        problem = case.experiment.calibrated(calibrations.get(point.name, []))
-        bounds[point.name] = bounds_percent(problem, case.noise, true, case.times_s)
-    heads = headlines([(q.label, percent) for found in bounds.values() for q, percent in found])
-    for point in points:
-        case = study.points[point.name]
-        for method in study.config.methods:
-            batches = files[point.name, method]
-            found = pd.concat([read_batch(path, case) for path in batches])
+    rows: list[tuple[str | int, ...]] = []
+    for name in block.cases:
+        true, grid, bounds = study.cases[name].parameters, block.points(sweep, name), {}
+        for point in grid:
+            case = study.points[point.name]
+            problem = case.experiment.calibrated(calibrations.get(point.name, []))
+            bounds[point.name] = bounds_percent(problem, case.noise, true, case.times_s)
+        heads = headlines([(q.label, percent) for found in bounds.values() for q, percent in found])
+        for point, method in product(grid, study.config.methods):
+            case = study.points[point.name]
+            found = pd.concat([read_batch(path, case) for path in files[point.name, method]])
             if case.noise.absent:
                 # Without noise, the misfit of the true values rounded to the genes' digits.
                 found = found.assign(noise_rms=_resolution(case, true))
             near = float(np.mean(near_noise(found, study.near_noise_tolerance)))
-            for judged in _judged(case, true, found, bounds[point.name], heads, near):
-                yield point.name, point.row.shown, point.column.shown, method, *judged
+            head = point.name, point.row.shown, point.column.shown, method
+            judged = _judged(case, true, found, bounds[point.name], heads, near)
+            rows += ((*head, *own) for own in judged)
+    POINTS.write(points, rows)
 
 
 def _judged(
@@ -88,22 +79,18 @@ def _judged(
     heads: list[str],
     near: float,
 ) -> Iterator[tuple[str | int, ...]]:
-    """Yield what one method finds at a point, for every quantity."""
     searched = point.experiment.searched.parameters
-    members = {q.label: [searched[index] for index in q.members] for q, _ in bounds}
-    truths = {label: sum(true[p.name] for p in of) for label, of in members.items()}
-    values = {
-        label: found[[p.column for p in of]].sum(axis=1).to_numpy(float)
-        for label, of in members.items()
-    }
-    inside = np.ones(len(found), dtype=bool)
+    errors, inside = {}, np.ones(len(found), dtype=bool)
     for q, percent in bounds:
+        members = [searched[index] for index in q.members]
+        truth = sum(true[p.name] for p in members)
+        values = found[[p.column for p in members]].sum(axis=1).to_numpy(float)
+        errors[q.label] = 100 * np.abs(values - truth) / (truth or np.nan)
         if q.label in heads:
-            inside &= in_basin(values[q.label], truths[q.label], percent / 100)
+            inside &= in_basin(values, truth, percent / 100)
     for q, percent in bounds:
-        truth = truths[q.label]
-        errors = 100 * np.abs(values[q.label] - truth) / (truth or np.nan)
-        medians = [np.median(some) if len(some) else np.nan for some in (errors, errors[inside])]
+        every = errors[q.label]
+        medians = [np.median(some) if len(some) else np.nan for some in (every, every[inside])]
         share = float(np.mean(inside)) if heads else np.nan
         numbers = (near, share, *medians, percent)
         yield q.label, len(found), *("" if np.isnan(it) else f"{it:.6g}" for it in numbers)
@@ -168,6 +155,11 @@ _BY_METHOD = {
 }
 # Errors, and the least that is told without noise, where rounding decides how a fit ends.
 _ERRORS, _LEAST_PERCENT = [name for name in _BY_METHOD if "error" in name], 1.0
+
+
+def write_robustness(study: Study, sweep: str, points: Path, table: Path) -> None:
+    """Write the table of a sweep."""
+    write(robustness(study, sweep, points), table)
 
 
 def robustness(study: Study, name: str, points: Path) -> ShownTable:

@@ -97,48 +97,38 @@ _LONGEST_PATH = 200
 
 @dataclass(frozen=True)
 class Columns:
-    """Names and units of the columns of a trace, and which of its rows are used."""
+    """Names and units of the columns of a trace, and which of its rows are used.
+
+    What has no words here is as the key of the config's `measurement` of its name says.
+    """
 
     time: str
     """Name of the column of times, or of a sweep's frequencies."""
     reading: str
     """Name of that of what the instrument reads."""
     time_unit: str | None = None
-    """Key of its `AXES`; None if the file has the unit."""
+    """Key of its `AXES`; None, here and below, if the file has the unit."""
     reading_unit: str | None = None
-    """Key of the quantity's units, likewise."""
     scale: float = 1.0
-    """Reading in its unit over the number in the column."""
     start_s: float | None = None
-    """Time of the clock at which the protocol starts, if it is known."""
     by_options: bool = False
     """True if command-line options set them, false for config keys; used in messages."""
     sd: str | None = None
-    """Name of the column of the readings' standard deviations, in their unit, if there is one."""
     quantity: Channel = ROTATION
     """What is read."""
     block: int | None = None
-    """Number of the table to read, from 1, where a file has several; None for the only one."""
     average_repeated: bool = False
-    """True to average the readings of equal times."""
     from_s: float | None = None
-    """First time of the clock to use; None for all."""
     until_s: float | None = None
-    """Last time of the clock to use."""
     rows: Mapping[str, str | float] | None = None
-    """Values of other columns in the rows to use; None for all."""
     load: str | None = None
-    """Name of the column of what was controlled, if that is to be read."""
     load_unit: str | None = None
-    """Key of its units."""
     partner: Channel | None = None
     """What a sweep reads beside the quantity."""
     partner_column: str = ""
     """Name of its column."""
     partner_unit: str | None = None
-    """Key of its units; None if the file has the unit."""
     loss_sd: str | None = None
-    """Name of the column of standard deviations of the loss modulus."""
     sphere_m: float | None = None
     """Radius of the sphere whose force and indentation are read, if there is one."""
 
@@ -146,11 +136,6 @@ class Columns:
     def axis(self) -> str:
         """What readings follow: a key of `AXES`."""
         return "frequency" if self.partner else "time"
-
-    @property
-    def unit_key(self) -> str:
-        """The key that says the unit of the readings."""
-        return "rotation_unit" if self.quantity == ROTATION else "reading_unit"
 
     @property
     def named(self) -> dict[str, str]:
@@ -297,7 +282,6 @@ def held_unit(value: float | str, controlled: Channel, by: str = "--hold") -> tu
 
 
 def _endings(column: str, *patterns: str) -> list[str]:
-    """Return what patterns find at the end of a name."""
     name = re.sub(r"_per_([^\W_]+)$", r" 1/\1", plain_name(column))
     found = filter(None, (re.search(pattern, name) for pattern in patterns))
     return ["".join(filter(None, match.groups())).strip() for match in found]

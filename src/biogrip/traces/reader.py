@@ -12,7 +12,7 @@ import numpy as np
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.digits import counted, plain
 from biogrip.errors import BiogripError, nearest
-from biogrip.physics.instruments import INSTRUMENTS, PHASE
+from biogrip.physics.instruments import INSTRUMENTS, PHASE, ROTATION
 from biogrip.physics.protocol import joined
 from biogrip.terminal import visible
 from biogrip.traces.columns import AXES, Columns, listed, place, shortened, unit_of
@@ -399,8 +399,8 @@ def _columns_of(
 
 def _unit(path: Path | None, key: str, below: str, columns: Columns, units: list[str]) -> str:
     """Return the unit of a column; standard deviations have that of the readings before them."""
-    name, given, unit_key = columns.named[key], columns.reading_unit, columns.unit_key
-    allowed = columns.quantity.units
+    name, given, allowed = columns.named[key], columns.reading_unit, columns.quantity.units
+    unit_key = "rotation_unit" if columns.quantity == ROTATION else "reading_unit"
     if key == columns.axis:
         given, unit_key, allowed = columns.time_unit, f"{key}_unit", AXES[columns.axis]
     elif columns.partner and key == columns.partner.name:
@@ -492,7 +492,6 @@ def _chosen(path: Path, sheet: Sheet, table: Table, columns: Columns) -> BoolArr
 
 
 def _load(path: Path, columns: Columns, history: Array, lines: IntArray, units: list[str]) -> Array:
-    """Return rows of times and loads, (n, 2), in SI units."""
     _check_count(path, columns, len(history), 0)
     if columns.average_repeated:
         history, lines, _ = _averaged(history, lines)

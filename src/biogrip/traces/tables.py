@@ -152,7 +152,6 @@ def read_sheet(path: Path, columns: Columns) -> Sheet:
 
 
 def _read_lines(path: Path) -> tuple[str, list[str]]:
-    """Return the encoding of a file, and its lines."""
     if problem := trace_file_problem(path):
         raise BiogripError(f"{place(path)}: {problem}")
     try:
@@ -308,7 +307,6 @@ def _in_words(sheet: Sheet, table: Table, columns: Columns) -> str:
 
 
 def _tables(sheet: Sheet, columns: Columns) -> list[Table]:
-    """Return all tables in the order of the file."""
     found = (_header(sheet, at, columns) for at in sheet.headers)
     tables = [table for table in found if table is not None]
     ends = [0, *(_end(sheet, *pair) for pair in pairwise(tables)), _last_end(sheet)]
@@ -377,7 +375,6 @@ def _in_preamble(cells: Sequence[str], width: int) -> bool:
 
 
 def _title(sheet: Sheet, start: int, table: Table) -> str:
-    """Return words of a preamble: the name of a step, or the last few lines."""
     start = table.at - 1 if table.is_step else max(start, table.at - _PREAMBLE_LINES_SHOWN)
     words = (" ".join(filter(None, cells)) for cells in sheet.cells[start : table.at])
     return "; ".join(shortened(each) for each in words if each)
