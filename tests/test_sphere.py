@@ -18,12 +18,12 @@ APPROACH = ["--reading", "force=force_nN", "--load", "indentation_nm", *SPHERE]
 APPROACH += ["--model", "zener_maxwell"]
 
 
-def _approach(time_s: Array, depth_m: float = 5e-7, lasts_s: float = 0.5) -> Array:
-    """Return the force of Hertz's hereditary integral, d(t) a ramp that is then held."""
+def _approach(time_s: Array) -> Array:
+    """Return the force of Hertz's hereditary integral, d(t) a ramp of half a second, then held."""
     forces = []
     for now in time_s:
-        s = np.linspace(0, min(max(now, 0), lasts_s), 2001)
-        rate = 1.5 * (depth_m / lasts_s) ** 1.5 * np.sqrt(s)
+        s = np.linspace(0, min(max(now, 0), 0.5), 2001)
+        rate = 1.5 * (5e-7 / 0.5) ** 1.5 * np.sqrt(s)
         modulus = SOFT_PA + STIFF_PA * np.exp(-(now - s) / TIME_S)
         forces.append(16 / 9 * np.sqrt(RADIUS_M) * np.trapezoid(modulus * rate, s))
     return np.array(forces)

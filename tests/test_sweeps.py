@@ -42,8 +42,8 @@ def swept(values: Array, omega: Array = OMEGA, **given: Any) -> Any:
     return told(omega, values[0], loss=values[1], **(GIVEN | given))
 
 
-def solid(seed: int = 1, **given: Any) -> Array:
-    return noisy(moduli("zener_maxwell", OMEGA, *(SOLID | given).values()), seed=seed)
+def solid(**given: Any) -> Array:
+    return noisy(moduli("zener_maxwell", OMEGA, *(SOLID | given).values()), seed=1)
 
 
 @pytest.mark.parametrize("name", MODELS)

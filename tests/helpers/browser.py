@@ -26,7 +26,7 @@ def chromium() -> Iterator[Browser]:
 class Opened:
     """A page, what went wrong in it, and what it asked for beside itself."""
 
-    def __init__(self, browser: Any, page: Path, fragment: str = "", **context: Any) -> None:
+    def __init__(self, browser: Any, page: Path, **context: Any) -> None:
         self.problems: list[str] = []
         self.asked: list[str] = []
         self.context = browser.new_context(**context)
@@ -34,7 +34,7 @@ class Opened:
         self.page.on("pageerror", lambda error: self.problems.append(str(error)))
         self.page.on("console", self._said)
         self.page.on("request", self._requested)
-        self.page.goto(page.as_uri() + fragment)
+        self.page.goto(page.as_uri())
 
     def close(self) -> None:
         assert (self.problems, self.asked) == ([], [])

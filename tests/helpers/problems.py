@@ -53,8 +53,8 @@ def pose_noisy(
     return replace(EXPERIMENT, ranges=RANGES, **own).of_each(times, traces, model)
 
 
-def problem(case: str, seed: int, level: float = 0.1, rate_Hz: float = 1.0) -> TraceProblem:
-    return pose_noisy(*clean(case, rate_Hz), seed + 1, level=level)[seed]
+def problem(case: str, seed: int, rate_Hz: float = 1.0) -> TraceProblem:
+    return pose_noisy(*clean(case, rate_Hz), seed + 1)[seed]
 
 
 def run(method: str, posed: TraceProblem, seed: int = 0) -> Fit:

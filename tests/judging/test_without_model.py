@@ -36,13 +36,11 @@ def tell(
     phases: tuple[Phase, ...] = HELD,
     reads: str = "stress",
     gripper: Gripper | None = None,
-    sd: Array | None = None,
     at_s: Sequence[float] = (),
     **known: Any,
 ) -> WithoutModel:
     """What a trace tells without a model."""
-    posed = set_up(gripper or INSTRUMENTS[reads], phases, Sample("maxwell"))
-    posed = replace(posed, **known).weighted(sd)
+    posed = replace(set_up(gripper or INSTRUMENTS[reads], phases, Sample("maxwell")), **known)
     residuals = posed.of(time_s, readings).residuals
     return tell_without_model(residuals, confidence=0.95, noise_sd=posed.noise_sd, at_s=at_s)
 

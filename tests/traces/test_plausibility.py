@@ -30,14 +30,11 @@ MIRRORED = "found a rotation that goes against the torque"
 
 
 def trace(
-    sample: tuple[float, ...],
-    time_s: Array = TIMES,
-    gripper: Gripper = GRIPPER,
-    phases: tuple[Phase, ...] = STUDY.phases,
+    sample: tuple[float, ...], time_s: Array = TIMES, phases: tuple[Phase, ...] = STUDY.phases
 ) -> Array:
     model = Sample("generalized_maxwell")
     values = dict(zip(model.model.names, sample, strict=True))
-    return simulate(set_up(gripper, phases, model), values, time_s)
+    return simulate(set_up(GRIPPER, phases, model), values, time_s)
 
 
 def said(

@@ -15,7 +15,7 @@ from tests.helpers.identified import FEW, write_drop
 from tests.helpers.places import ROOT
 from tests.helpers.required import cannot_run
 from tests.helpers.runs import ONE_CASE, snakemake
-from tests.helpers.slurm.cluster import SlurmError, missing_packages, one_node_slurm
+from tests.helpers.slurm.cluster import missing_packages, one_node_slurm
 
 pytestmark = pytest.mark.nightly
 
@@ -34,7 +34,7 @@ def slurm(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, str]]:
     with ExitStack() as cluster:
         try:
             environment = cluster.enter_context(one_node_slurm())
-        except SlurmError as error:
+        except TimeoutError as error:
             cannot_run(REQUIRED, f"Slurm does not start: {error}")
         yield {**environment, "PYTHONPATH": plugin}
 

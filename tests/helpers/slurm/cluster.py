@@ -23,10 +23,6 @@ PATH = os.pathsep.join([os.environ["PATH"], "/usr/sbin"])
 PATIENCE_S = 30.0
 
 
-class SlurmError(Exception):
-    """The cluster did not start."""
-
-
 def missing_packages() -> list[str]:
     """Debian packages that the cluster needs and this machine has not got."""
     return [package for name, package in PACKAGES.items() if not shutil.which(name, path=PATH)]
@@ -42,7 +38,7 @@ def one_node_slurm() -> Iterator[dict[str, str]]:
             running.enter_context(_daemon(daemon, environment, folder))
         if not _in_time("sinfo --noheader --format=%T | grep -q idle", environment):
             logs = [f"{log.name}:\n{log.read_text()}" for log in sorted(folder.glob("*.out"))]
-            raise SlurmError("\n".join([f"no idle node in {PATIENCE_S:.0f} s", *logs]))
+            raise TimeoutError("\n".join([f"no idle node in {PATIENCE_S:.0f} s", *logs]))
         try:
             yield environment
         finally:
