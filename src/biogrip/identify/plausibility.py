@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from operator import itemgetter
 
 import numpy as np
+from scipy.special import ndtri
 
 from biogrip.arrays import Array
 from biogrip.digits import plain
@@ -17,6 +18,7 @@ from biogrip.errors import BiogripError
 from biogrip.fit.any_sample import fit_responses
 from biogrip.fit.experiment import Experiment
 from biogrip.judging.levels import (
+    BELOW_ZERO,
     FAR_ABOVE,
     LARGEST_SHARE,
     NO_RESPONSE,
@@ -25,8 +27,8 @@ from biogrip.judging.levels import (
 )
 from biogrip.physics.modes import lag_course
 from biogrip.physics.noise import nuisance_basis, without
-from biogrip.physics.protocol import Course, largest_load
-from biogrip.traces.columns import TIME_UNITS
+from biogrip.physics.protocol import Course, is_storage, largest_load
+from biogrip.traces.columns import AXES, TIME_UNITS, place
 from biogrip.traces.reader import Recording
 
 # Distance from the median, over that of all but a tenth, of what is no reading.
@@ -38,6 +40,21 @@ _LAG_SHARES = (1e-9, 0.03, 0.1, 0.3, 1.0, 10.0)
 _FAR_LIKELIER = -2 * math.log(NO_RESPONSE)
 # Share of a function's norm that may be rounding error.
 _ROUNDING = 1e-9
+# What makes a modulus negative.
+_NEGATIVE = {
+    True: (
+        "storage modulus",
+        " The phase is beyond 90 degrees, as where inertia outweighs the sample at high "
+        "frequencies: correct for it, or leave these rows out (--until). Of a liquid it may be "
+        "noise: then say how much (--noise).",
+    ),
+    False: (
+        "loss modulus",
+        " The sample would give energy instead of losing it: the phase has the wrong sign or an "
+        "offset, or the loss is below the noise: then say how much that is (--noise), or leave "
+        "these rows out (--from, --until, or no number in the cell).",
+    ),
+}
 # Multiple of the free rotation beyond which its square could overflow.
 _ABSURD = 1e9
 
@@ -127,6 +144,23 @@ def check_recording(
         return None
     turn = float(np.abs(amplitudes @ responses).max())
     return _check_turn(recording, turn, free, noise_sd)
+
+
+def check_moduli(sweep: Recording, sd: Array | float) -> None:
+    """Refuse a sweep with a modulus further below zero than noise takes that of a sample.
+
+    The noise has standard deviations `sd`, (n_samples,), 0 where nothing says it.
+    """
+    least = np.broadcast_to(sd * ndtri(BELOW_ZERO), sweep.readings.shape)
+    for sample in np.flatnonzero(sweep.readings <= least)[:1]:
+        omega, unit = abs(sweep.time_s[sample]), sweep.units[0]
+        name, why = _NEGATIVE[bool(is_storage(sweep.time_s[sample]))]
+        above = f"{plain(least[sample], 2)} by the noise that is given" if least[sample] else "0"
+        raise BiogripError(
+            f"{place(sweep.path, int(sweep.lines[sample]))}: found a {name} of "
+            f"{sweep.readings[sample]:.3g}, at {omega / AXES['frequency'][unit]:g} {unit}; allowed "
+            f"is one above {above}.{why}"
+        )
 
 
 def _either_sign(trace: Array, responses: Array, nuisance: Array) -> list[tuple[Array, float]]:

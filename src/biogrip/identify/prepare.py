@@ -23,7 +23,7 @@ from biogrip.fit.any_sample import proportional_deviations, swept_deviations
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.genome import GeneRange
 from biogrip.identify.load_noise import without_noise
-from biogrip.identify.plausibility import check_recording
+from biogrip.identify.plausibility import check_moduli, check_recording
 from biogrip.judging.onset import OnsetFits, estimate_onset
 from biogrip.physics.fractional import LONGEST_S, SHORTEST_S
 from biogrip.physics.noise import MOST_SAMPLES, drift_is_flow, estimate_noise
@@ -131,7 +131,9 @@ def _checked(trace: Recording, experiment: Experiment) -> Recording:
 
 def _with_deviations(sweep: Recording, share: float | None, noise_sd: float | None) -> Recording:
     """Return a sweep with standard deviations of its readings, or of their ratios."""
-    if sweep.sd is not None or (share is None and noise_sd is not None):
+    known = noise_sd if sweep.sd is None and share is None else sweep.sd
+    check_moduli(sweep, 0.0 if known is None else known)
+    if known is not None:
         return sweep
     sd, shares = swept_deviations(sweep.time_s, sweep.readings, share, noise_sd or 0.0)
     if share is not None:

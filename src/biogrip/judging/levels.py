@@ -156,5 +156,9 @@ SHORTEST_SHARE = 0.02
 NO_RESPONSE = 1e-3
 """Share of traces of pure noise that are accepted as a response."""
 
+BELOW_ZERO = 1e-6
+"""Level, for each modulus of a sweep, at which one below zero is no noise: of ten thousand right
+sweeps hardly one is refused. What is nearer, other tests judge."""
+
 FAR_ABOVE = 10.0
 """Multiple of a given noise from which a rotation is seen, however small it is."""
