@@ -24,9 +24,15 @@ from biogrip.fit.experiment import Experiment
 from biogrip.fit.genome import GeneRange
 from biogrip.identify.load_noise import without_noise
 from biogrip.identify.plausibility import check_moduli, check_recording
+from biogrip.judging.levels import ALIKE, ONE_STEP, REPEATED
 from biogrip.judging.onset import OnsetFits, estimate_onset
 from biogrip.physics.fractional import LONGEST_S, SHORTEST_S
-from biogrip.physics.noise import MOST_SAMPLES, drift_is_flow, estimate_noise
+from biogrip.physics.noise import (
+    MOST_SAMPLES,
+    drift_is_flow,
+    estimate_noise,
+    measure_rounding,
+)
 from biogrip.physics.protocol import Course, is_held, largest_load, with_steps
 from biogrip.traces.columns import place
 from biogrip.traces.reader import Recording
@@ -101,6 +107,8 @@ def _checked(trace: Recording, experiment: Experiment) -> Recording:
             f"{MOST_SAMPLES} with {'weights' if weighted else 'a coloured noise model'}: average "
             "neighbouring ones."
         )
+    if not experiment.instrument.sweeps:
+        trace = without_repeats(trace)
     onset_s = trace.read.start_s
     if experiment.fit_start:
         onset_s = estimate_onset(experiment, trace.time_s, trace.readings)
@@ -153,6 +161,27 @@ def without_steps(trace: Recording, protocol: Course) -> Recording:
     at = np.isin(protocol.snapped(trace.time_s), protocol.jumps_s)
     times = trace.time_s[at] + (trace.onset_s or 0.0)
     return replace(trace.part(~at), at_steps=tuple(times.tolist()))
+
+
+def without_repeats(trace: Recording) -> Recording:
+    """Keep one of each reading of a sensor that is read less often than it is logged.
+
+    Rounded readings repeat, too, but change by one step. A sensor that stands still for long does
+    something else.
+    """
+    changes = np.diff(trace.readings)
+    kept = np.append(True, changes != 0)
+    at_ends = np.abs(changes[1:][~kept[1:-1] & kept[2:]])
+    runs = np.diff(np.append(np.flatnonzero(kept), len(kept)))
+    step = measure_rounding(trace.readings)
+    held = np.mean(~kept) > REPEATED and np.max(runs) <= ALIKE * np.median(runs)
+    if not (held and len(at_ends) and np.median(at_ends) > ONE_STEP * step):
+        return trace
+    said = (
+        "Left out, for they repeat the one before, as of a sensor that is read less often than it "
+        f"is logged: {np.count_nonzero(~kept)} of {len(kept)} readings."
+    )
+    return replace(trace.part(kept), remarks_before=(*trace.remarks_before, said))
 
 
 def without_padding(trace: Recording) -> Recording:

@@ -186,17 +186,12 @@ def _misfit(
             "standard deviations (--sd)."
         )
         return Remainder([Note(DOUBT, text)])
-    more, read = plain(times, 2), residuals.trace.readings
+    more = plain(times, 2)
     share = scale * float(np.sqrt(times**2 - 1)) / residuals.peak
     relative = residuals.course.sweeps and residuals.coloured
     of_peak = f"{plain(100 * share, 2)} % of the {'moduli' if relative else 'peak'}"
     suspects = name_suspects(residuals, times, scale)
-    if not residuals.trace.rounding and np.mean(read[1:] == read[:-1]) > levels.REPEATED:
-        text = (
-            "Most readings repeat the one before, as of a sensor that is read less often than it "
-            "is logged: keep one of each."
-        )
-    elif not residuals.course.sweeps and has_fast_noise(residuals, *left):
+    if not residuals.course.sweeps and has_fast_noise(residuals, *left):
         text = (
             f"The misfit is {more} times the noise of neighbouring readings, as of noise that is "
             "correlated for a short time."
