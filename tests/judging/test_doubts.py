@@ -211,3 +211,17 @@ def test_of_a_sensor_that_is_logged_more_often_than_read_one_of_each_reading_is_
     # It stands still for half of the trace.
     stuck = np.where(time_s < 30, np.repeat(values[::times], times), values[300])
     assert told(time_s, stuck, **ZENER).status != OK
+
+
+def test_rounding_is_named_and_limits_allow_for_it() -> None:
+    """The last readings are all 1600 where 1510 is true, of which noise would tell more."""
+    time_s = np.arange(1, 601) / 10
+    values = 1510 + 3000 * np.exp(-time_s / 2)
+    found = told(time_s, 200 * np.round(values / 200), **ZENER)
+    assert found.status == DOUBTFUL
+    rounded, *others = found.data["reasons"]
+    assert rounded.startswith("The readings are rounded to steps of 200 Pa")
+    assert all("as rounding leaves them" in each for each in others)
+    limits, truth = found.to_frame().loc[["k", "k_p", "c"]], [3000, 1510, 6000]
+    assert np.all((limits["low"] < truth) & (limits["high"] > truth))
+    assert np.all(limits["high"] < 3 * limits["low"])

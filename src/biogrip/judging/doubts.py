@@ -45,7 +45,7 @@ from biogrip.judging.whiteness import (
     uneven,
     wandering,
 )
-from biogrip.physics.noise import MOST_SAMPLES, NoiseModel, estimate_noise, without
+from biogrip.physics.noise import MOST_SAMPLES, ROOT_12, NoiseModel, estimate_noise, without
 from biogrip.physics.residuals import Residuals
 
 HARMLESS, DOUBT, REJECTION = "harmless", "doubt", "rejection"
@@ -53,6 +53,9 @@ HARMLESS, DOUBT, REJECTION = "harmless", "doubt", "rejection"
 
 OK, DOUBTFUL, REJECTED = "ok", "doubtful", "rejected"
 """Status of a fit by the heaviest of its notes."""
+
+ROUNDED = "The readings are rounded"
+"""Beginning of the note on errors of rounding."""
 
 _STATUS = {HARMLESS: OK, DOUBT: DOUBTFUL, REJECTION: REJECTED}
 _WEIGHTS = tuple(_STATUS)
@@ -168,7 +171,26 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
                 "coloured, gives intervals that allow for such noise.",
             )
         )
+    small = misfit <= levels.TOO_MUCH * rounding / ROOT_12 and np.max(np.abs(residual)) <= rounding
+    if small and in_time and not residuals.coloured and likelihood.freedom < np.inf:
+        return _rounded(residuals, misfit, compute_status(notes))
     return Remainder(notes, found.misfit if found else None)
+
+
+def _rounded(residuals: Residuals, misfit: float, status: str) -> Remainder:
+    """Return the note on errors of rounding, of which all of one reading count as one."""
+    trace, samples = residuals.trace, residuals.samples
+    _, counts = np.unique(trace.readings, return_counts=True)
+    # A fit may absorb most of them.
+    absorbed_too = min(misfit * ROOT_12 / trace.rounding, 1.0) ** 2
+    independent = absorbed_too * samples**2 / float(np.sum(counts**2))
+    unit = f" {residuals.instrument.read.unit}".rstrip()
+    text = (
+        f"{ROUNDED} to steps of {plain(trace.rounding, 2)}{unit}, which is more than their noise: "
+        "what the fit leaves is rounding. The limits allow for one error wherever a reading is the "
+        "same."
+    )
+    return Remainder([Note(HARMLESS if status == OK else DOUBT, text)], (independent, samples))
 
 
 def _misfit(
