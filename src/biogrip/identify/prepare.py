@@ -22,7 +22,7 @@ from biogrip.errors import BiogripError
 from biogrip.fit.any_sample import proportional_deviations, swept_deviations
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.genome import GeneRange
-from biogrip.identify.load_noise import without_noise
+from biogrip.identify.load_noise import tare_of, without_noise
 from biogrip.identify.plausibility import check_moduli, check_recording
 from biogrip.judging.levels import ALIKE, ONE_STEP, REPEATED
 from biogrip.judging.onset import OnsetFits, estimate_onset
@@ -68,6 +68,15 @@ def prepare(recording: Recording, experiment: Experiment) -> tuple[Recording, Ex
             # A log may write all of them alike, as in the first row after each.
             uncertainty["all steps"] = {"share": 1.0}
         experiment = replace(experiment, record=record, uncertainty=uncertainty)
+        if tare := tare_of(experiment, recording):
+            unit = f" {experiment.instrument.controlled.unit}".rstrip()
+            said = (
+                f"Taken off the {experiment.instrument.controlled.name}, as a tare: "
+                f"{plain(tare)}{unit}, there from its first row on, which the readings do not "
+                "follow."
+            )
+            recording = replace(recording, remarks_before=(*recording.remarks_before, said))
+            experiment = replace(experiment, record=record - (0.0, tare))
     recording = _checked(recording, experiment)
     if experiment.record is not None:
         record, noise = without_noise(experiment, recording.time_s, recording.readings)
