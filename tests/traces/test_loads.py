@@ -173,7 +173,7 @@ def test_what_readings_do_not_follow_is_taken_off_the_load(
     assert experiment.record is not None
     assert experiment.record[[0, -1], 1] == pytest.approx([0.3 - taken_off, 1.3 - taken_off])
     said = " ".join(recording.remarks())
-    assert ("Taken off the stress, as a tare: 0.3 Pa" in said) == bool(taken_off)
+    assert ("a tare that readings do not follow: 0.3 Pa" in said) == bool(taken_off)
 
 
 def test_of_a_clean_course_nothing_is_smoothed_out() -> None:

@@ -148,7 +148,7 @@ def _notes_on_traces(
         if not rounded and all(note.weight == HARMLESS for note in start):
             said += opinions[index]
         said += note_flow(recording, experiment)
-        said += note_saturated(recording, experiment, rounded=rounded)
+        said += [] if rounded else note_saturated(recording, experiment)
         notes.append(said)
     return notes
 

@@ -42,21 +42,10 @@ _MOST_READINGS, _BETTER = 5000, 1.0
 
 
 def without_noise(experiment: Experiment, time_s: Array, readings: Array) -> tuple[Array, float]:
-    """Return the record of an experiment, smoothed if its noise is the sensor's, and that noise.
+    """Return the record of an experiment, (n, 2), smoothed if its noise is the sensor's.
 
-    Parameters
-    ----------
-    experiment
-        What was done; it has a record.
-    time_s, readings : (n_samples,)
-        A trace, times ascending.
-
-    Returns
-    -------
-    record : (n, 2)
-        As `Experiment.record`.
-    noise
-        Standard deviation of what was smoothed out, as a share of the largest value.
+    Also returned is the standard deviation of what was smoothed out, as a share of the largest
+    value. Of the trace, times ascend, (n_samples,).
     """
     assert experiment.record is not None
     smooth = experiment.record.copy()

@@ -440,15 +440,11 @@ def note_flow(recording: Recording, experiment: Experiment) -> list[Note]:
     return [Note(HARMLESS, text)]
 
 
-def note_saturated(
-    recording: Recording, experiment: Experiment, *, rounded: bool = False
-) -> list[Note]:
+def note_saturated(recording: Recording, experiment: Experiment) -> list[Note]:
     """Return a doubt if many readings after the start are exactly the largest, or the smallest.
 
-    Readings that are only rounded have neighbouring values nearly as often, if noise moves them.
+    Readings that are only rounded have neighbouring values nearly as often.
     """
-    why = "the instrument looks saturated, and what it cut off is missing"
-    why = "as rounding leaves them, or a saturated instrument" if rounded else why
     values, counts = np.unique(recording.readings[recording.time_s > 0], return_counts=True)
     unit, notes = f" {experiment.instrument.read.unit}".rstrip(), []
     for end, at, near in (
@@ -460,7 +456,8 @@ def note_saturated(
         if counts[at] > MORE_OFTEN * np.max(counts[near]):
             text = (
                 f"{counts[at]} of {np.sum(counts)} readings are exactly the {end}, "
-                f"{plain(values[at])}{unit}: {why}."
+                f"{plain(values[at])}{unit}: the instrument looks saturated, and what it cut off "
+                "is missing."
             )
             notes.append(Note(DOUBT, text))
     return notes

@@ -27,12 +27,7 @@ from biogrip.identify.plausibility import check_moduli, check_recording
 from biogrip.judging.levels import ALIKE, ONE_STEP, REPEATED
 from biogrip.judging.onset import OnsetFits, estimate_onset
 from biogrip.physics.fractional import LONGEST_S, SHORTEST_S
-from biogrip.physics.noise import (
-    MOST_SAMPLES,
-    drift_is_flow,
-    estimate_noise,
-    measure_rounding,
-)
+from biogrip.physics.noise import MOST_SAMPLES, drift_is_flow, estimate_noise, measure_rounding
 from biogrip.physics.protocol import Course, is_held, largest_load, with_steps
 from biogrip.traces.columns import place
 from biogrip.traces.reader import Recording
@@ -69,12 +64,9 @@ def prepare(recording: Recording, experiment: Experiment) -> tuple[Recording, Ex
             uncertainty["all steps"] = {"share": 1.0}
         experiment = replace(experiment, record=record, uncertainty=uncertainty)
         if tare := tare_of(experiment, recording):
-            unit = f" {experiment.instrument.controlled.unit}".rstrip()
-            said = (
-                f"Taken off the {experiment.instrument.controlled.name}, as a tare: "
-                f"{plain(tare)}{unit}, there from its first row on, which the readings do not "
-                "follow."
-            )
+            controlled = experiment.instrument.controlled
+            size = f"{plain(tare)} {controlled.unit}".rstrip()
+            said = f"Taken off the {controlled.name}, a tare that readings do not follow: {size}."
             recording = replace(recording, remarks_before=(*recording.remarks_before, said))
             experiment = replace(experiment, record=record - (0.0, tare))
     recording = _checked(recording, experiment)
@@ -175,16 +167,16 @@ def without_steps(trace: Recording, protocol: Course) -> Recording:
 def without_repeats(trace: Recording) -> Recording:
     """Keep one of each reading of a sensor that is read less often than it is logged.
 
-    Rounded readings repeat, too, but change by one step. A sensor that stands still for long does
-    something else.
+    Rounded readings repeat, too, but change by one step; a sensor may stand still for long.
     """
     changes = np.diff(trace.readings)
     kept = np.append(True, changes != 0)
     at_ends = np.abs(changes[1:][~kept[1:-1] & kept[2:]])
     runs = np.diff(np.append(np.flatnonzero(kept), len(kept)))
-    step = measure_rounding(trace.readings)
     held = np.mean(~kept) > REPEATED and np.max(runs) <= ALIKE * np.median(runs)
-    if not (held and len(at_ends) and np.median(at_ends) > ONE_STEP * step):
+    if not (
+        held and len(at_ends) and np.median(at_ends) > ONE_STEP * measure_rounding(trace.readings)
+    ):
         return trace
     said = (
         "Left out, for they repeat the one before, as of a sensor that is read less often than it "

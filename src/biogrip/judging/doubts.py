@@ -179,18 +179,17 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
 
 def _rounded(residuals: Residuals, misfit: float, status: str) -> Remainder:
     """Return the note on errors of rounding, of which all of one reading count as one."""
-    trace, samples = residuals.trace, residuals.samples
-    _, counts = np.unique(trace.readings, return_counts=True)
+    samples, step = residuals.samples, residuals.trace.rounding
+    _, counts = np.unique(residuals.trace.readings, return_counts=True)
     # A fit may absorb most of them.
-    absorbed_too = min(misfit * ROOT_12 / trace.rounding, 1.0) ** 2
-    independent = absorbed_too * samples**2 / float(np.sum(counts**2))
-    unit = f" {residuals.instrument.read.unit}".rstrip()
+    left = min(misfit * ROOT_12 / step, 1.0) ** 2
+    size = f"{plain(step, 2)} {residuals.instrument.read.unit}".rstrip()
     text = (
-        f"{ROUNDED} to steps of {plain(trace.rounding, 2)}{unit}, which is more than their noise: "
-        "what the fit leaves is rounding. The limits allow for one error wherever a reading is the "
-        "same."
+        f"{ROUNDED} to steps of {size}, more than their noise, or are cut off there. The limits "
+        "allow for one error wherever a reading is the same."
     )
-    return Remainder([Note(HARMLESS if status == OK else DOUBT, text)], (independent, samples))
+    worth = left * samples**2 / float(np.sum(counts**2))
+    return Remainder([Note(HARMLESS if status == OK else DOUBT, text)], (worth, samples))
 
 
 def _misfit(

@@ -158,8 +158,8 @@ NO_RESPONSE = 1e-3
 """Share of traces of pure noise that are accepted as a response."""
 
 BELOW_ZERO = 1e-6
-"""Level, for each modulus of a sweep, at which one below zero is no noise: of ten thousand right
-sweeps hardly one is refused. What is nearer, other tests judge."""
+"""Level, for each modulus of a sweep, at which one below zero is no noise: hardly one of 10,000
+right sweeps is refused."""
 
 FAR_ABOVE = 10.0
 """Multiple of a given noise from which a rotation is seen, however small it is."""

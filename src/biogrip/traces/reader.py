@@ -166,18 +166,14 @@ def is_usual(recording: Recording) -> bool:
 def read_recording(path: Path, columns: Columns) -> Recording:
     """Read the columns of a recorded trace from a file.
 
-    The file is text in UTF-8, UTF-16 or Windows-1252. Empty lines and lines that start with ``#``
-    are ignored. The header is the line that has the columns, or has a row of units below it; of
-    several such tables, ``block`` says which. The header decides the separator: comma, semicolon or
-    tab. With the last two, numbers may have a decimal comma; one table has one decimal mark, and
-    other marks are between thousands. Times may be hours:minutes:seconds, after a date or not.
-    Cells may be quoted and padded with blanks, but a quoted cell ends on its line. Other columns
-    may hold anything.
+    The header is the line that has the columns, or has a row of units below it; of several such
+    tables, ``block`` says which. With semicolons or tabs between cells numbers may have a decimal
+    comma; one table has one decimal mark, and other marks are between thousands. Times may be
+    hours:minutes:seconds, after a date or not. Other columns may hold anything.
 
     An empty cell, ``nan``, ``NA``, ``N/A``, ``#N/A``, ``#NV`` (in any case) or ``-`` is a gap. Its
-    row is left out and counted; nothing is interpolated. Other spreadsheet errors, as ``#REF!``,
-    are refused. A `BiogripError` has file, line and column of what cannot be used, and what is
-    allowed.
+    row is left out and counted; nothing is interpolated. A `BiogripError` has file, line and column
+    of what cannot be used, and what is allowed.
     """
     sheet, quantity = read_sheet(path, columns), columns.quantity
     if columns.reading == quantity.name and quantity.name not in sheet.cells:
@@ -328,10 +324,8 @@ def _both_moduli(
     partner, read = columns.partner, columns.quantity
     assert partner is not None
     for row in np.flatnonzero(values[:, 0] <= 0)[:1]:
-        raise BiogripError(
-            f"{place(path, lines[row])}: found a frequency of {values[row, 0]:.3g}; "
-            "allowed is one above 0."
-        )
+        found = f"found a frequency of {values[row, 0]:.3g}; allowed is one above 0"
+        raise BiogripError(f"{place(path, lines[row])}: {found}.")
     first = values[:, 1] * (read.units[units[1]] * columns.scale)
     second = values[:, 2] * partner.units[units[2]]
     is_whole = read.name == "complex_modulus"
