@@ -201,6 +201,22 @@ def test_moduli_of_no_passive_sample_are_refused(row: int, said: str) -> None:
         swept(values)
 
 
+def test_a_modulus_below_zero_is_read_where_the_noise_that_is_given_takes_it_there() -> None:
+    """One of a million readings of zero is below 4.75 standard deviations."""
+    clean = moduli("zener_maxwell", OMEGA, *SOLID.values())
+    values = clean + 100 * np.random.default_rng(1).standard_normal(clean.shape)
+    values[1, 0] = -50.0
+    found = swept(values, noise=100.0)
+    assert found.data["fit"] == "ok"
+    limits = {name: (each["low"], each["high"]) for name, each in by_quantity(found.data).items()}
+    assert all(low < SOLID[name] < high for name, (low, high) in limits.items() if name in SOLID)
+    for noise, least in ((10.0, "above -48 by the noise"), (None, "above 0")):
+        with pytest.raises(BiogripError, match=rf"modulus of -50, at 0.1 rad/s \(loss\).* {least}"):
+            swept(values, noise=noise)
+    with pytest.raises(BiogripError, match="found a frequency of 0; allowed is one above 0"):
+        swept(values, OMEGA - OMEGA[0])
+
+
 def test_limits_are_those_of_lmfit(tmp_path: Path) -> None:
     """lmfit 1.3.4's `conf_interval` has them, by weights of 1/sd and chi-squared of known noise."""
     clean = moduli("zener_maxwell", OMEGA, *SOLID.values())

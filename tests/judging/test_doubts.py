@@ -194,12 +194,33 @@ def test_limits_of_quiet_traces_allow_for_a_wrong_model() -> None:
     assert np.all(limits["high"] < 2 * limits["low"])
 
 
-def test_a_sensor_that_is_logged_more_often_than_read_is_named() -> None:
+def test_of_a_sensor_that_is_logged_more_often_than_read_one_of_each_reading_is_kept() -> None:
     time_s, times = np.arange(1, 601) / 10, 5
     values = 1500 + 3000 * np.exp(-time_s / 2) + 20 * np.random.default_rng(0).standard_normal(600)
-    found = told(time_s, np.repeat(values[::times], times), **ZENER)
+    found, alone = (
+        told(*trace, **ZENER)
+        for trace in (
+            (time_s, np.repeat(values[::times], times)),
+            (time_s[::times], values[::times]),
+        )
+    )
+    assert (found.status, found.data["samples"]) == (OK, 600 // times)
+    assert found.data["quantities"] == alone.data["quantities"]
+    assert "repeat the one before, as of a sensor that is read less often" in str(found)
+    assert "480 of 600 readings" in str(found)
+    # It stands still for half of the trace.
+    stuck = np.where(time_s < 30, np.repeat(values[::times], times), values[300])
+    assert told(time_s, stuck, **ZENER).status != OK
+
+
+def test_rounding_is_named_and_limits_allow_for_it() -> None:
+    """The last readings are all 1600 where 1510 is true, of which noise would tell more."""
+    time_s = np.arange(1, 601) / 10
+    values = 1510 + 3000 * np.exp(-time_s / 2)
+    found = told(time_s, 200 * np.round(values / 200), **ZENER)
     assert found.status == DOUBTFUL
-    assert "repeat the one before" in found.data["reasons"][0]
-    ((all_of_them, count),) = re.findall(r"the (\d+) residuals as (\d+) independent", str(found))
-    assert 580 < int(all_of_them) <= 600
-    assert float(count) == pytest.approx(600 / times, rel=0.3)
+    (rounded,) = found.data["reasons"]
+    assert rounded.startswith("The readings are rounded to steps of 200 Pa")
+    limits, truth = found.to_frame().loc[["k", "k_p", "c"]], [3000, 1510, 6000]
+    assert np.all((limits["low"] < truth) & (limits["high"] > truth))
+    assert np.all(limits["high"] < 3 * limits["low"])

@@ -156,6 +156,26 @@ def test_a_load_whose_first_row_is_missing_goes_on_in_a_line(tmp_path: Path, beg
     assert record[0].tolist() == [0.0, pytest.approx(expected, abs=0.016)]
 
 
+@pytest.mark.parametrize(("since_s", "taken_off"), [(0.0, 0.0), (5.05, 0.3)])
+def test_what_readings_do_not_follow_is_taken_off_the_load(
+    tmp_path: Path, since_s: float, taken_off: float
+) -> None:
+    """Creep by 1/2 at once, and by 1/3 with 4 s; 0.3 Pa from 0 on are held, or a tare."""
+
+    def strain(after_s: Array) -> Array:
+        return np.where(after_s > 0, 1 / 2 + -np.expm1(-after_s / 4) / 3, 0.0)
+
+    stress = np.where(CLOCK > 5.05, 1.3, 0.3)
+    values = strain(CLOCK - 5.05) + 0.3 * strain(CLOCK + 1e-9) * (since_s == 0)
+    values += 1e-3 * np.random.default_rng(1).standard_normal(len(CLOCK))
+    trace, case = read_trace(loaded(tmp_path / "t.csv", CLOCK, values, stress))
+    recording, experiment = prepare(trace, case.experiment)
+    assert experiment.record is not None
+    assert experiment.record[[0, -1], 1] == pytest.approx([0.3 - taken_off, 1.3 - taken_off])
+    said = " ".join(recording.remarks())
+    assert ("a tare that readings do not follow: 0.3 Pa" in said) == bool(taken_off)
+
+
 def test_of_a_clean_course_nothing_is_smoothed_out() -> None:
     """Of a sinusoid with 25 rows a period 3e-4, and nothing of a constant or of steps."""
     course = np.sin(2 * np.pi * np.arange(500) / 25)

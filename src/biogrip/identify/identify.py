@@ -29,7 +29,7 @@ from biogrip.identify.other_fits import (
 )
 from biogrip.identify.prepare import prepare
 from biogrip.judging.diagnosis import Diagnosis, diagnose_all, with_times
-from biogrip.judging.doubts import HARMLESS, Note, find_slow_misfit, name_suspects
+from biogrip.judging.doubts import DOUBT, HARMLESS, ROUNDED, Note, find_slow_misfit, name_suspects
 from biogrip.judging.onset import notes_on_start, profile_over_onset
 from biogrip.traces.reader import Recording
 
@@ -142,10 +142,13 @@ def _notes_on_traces(
         given = recording.time_s, recording.readings, judged[index]
         start = notes_on_start(experiment, *given)
         said += start
-        # Beside another start, an offset and a drift mean nothing.
-        if all(note.weight == HARMLESS for note in start):
+        doubts = [note.text for note in judged[index].notes if note.weight == DOUBT]
+        rounded = any(text.startswith(ROUNDED) for text in doubts)
+        # Beside another start, or errors of rounding, an offset and a drift mean nothing.
+        if not rounded and all(note.weight == HARMLESS for note in start):
             said += opinions[index]
-        said += [*note_flow(recording, experiment), *note_saturated(recording, experiment)]
+        said += note_flow(recording, experiment)
+        said += [] if rounded else note_saturated(recording, experiment)
         notes.append(said)
     return notes
 

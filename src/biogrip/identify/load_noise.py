@@ -1,8 +1,8 @@
-"""Noise of a recorded load or deformation, where readings tell that it is the sensor's alone.
+"""Noise and tare of a recorded load or deformation, where readings tell that they are the sensor's.
 
 What scatters from row to row is either what the sample felt or noise of the sensor. Both courses,
 as recorded and smoothed, are fitted by what any sample might do. Only if the readings follow the
-smoothed one better, that is taken.
+smoothed one better, that is taken. So it is with what is there from the first row on.
 
 A smoothed course has the least sum of squared deviations and, times a weight, of squared third
 differences [1]_. The weight is that of least generalised cross-validation [2]_; shares of the
@@ -17,16 +17,20 @@ References
    (1979), 377-403.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
+from scipy.special import chdtri
 
 from biogrip.arrays import Array
 from biogrip.fit.any_sample import fit_responses, spread_lags
 from biogrip.fit.experiment import Experiment
+from biogrip.judging.levels import FEWEST_BEFORE, HELD, SURELY
 from biogrip.physics.modes import lag_course
 from biogrip.physics.noise import without
+from biogrip.traces.reader import Recording
 
 # Weights that are tried; change of a row over the median's that is no scatter; fewest rows.
 _WEIGHTS = 10.0 ** np.arange(-2, 13)
@@ -38,21 +42,10 @@ _MOST_READINGS, _BETTER = 5000, 1.0
 
 
 def without_noise(experiment: Experiment, time_s: Array, readings: Array) -> tuple[Array, float]:
-    """Return the record of an experiment, smoothed if its noise is the sensor's, and that noise.
+    """Return the record of an experiment, (n, 2), smoothed if its noise is the sensor's.
 
-    Parameters
-    ----------
-    experiment
-        What was done; it has a record.
-    time_s, readings : (n_samples,)
-        A trace, times ascending.
-
-    Returns
-    -------
-    record : (n, 2)
-        As `Experiment.record`.
-    noise
-        Standard deviation of what was smoothed out, as a share of the largest value.
+    Also returned is the standard deviation of what was smoothed out, as a share of the largest
+    value. Of the trace, times ascend, (n_samples,).
     """
     assert experiment.record is not None
     smooth = experiment.record.copy()
@@ -61,15 +54,42 @@ def without_noise(experiment: Experiment, time_s: Array, readings: Array) -> tup
     noise = float(np.std(smooth[:, 1] - values)) / largest
     if not noise:
         return smooth, noise
+    rest = _left(experiment, (experiment.record, smooth), time_s, readings)
+    better = rest[0] > rest[1] * np.exp(_BETTER / min(len(time_s), _MOST_READINGS))
+    return (smooth, noise) if better else (experiment.record, 0.0)
+
+
+def tare_of(experiment: Experiment, recording: Recording) -> float:
+    """Return what is controlled in the first rows, on and on, 0 if readings follow that.
+
+    Whatever sample and offset, they would have to follow the record better without it; or as well,
+    if these rows precede the start. Of a sphere nothing is linear.
+    """
+    record, load, start_s = experiment.record, recording.load, recording.read.start_s or 0.0
+    if record is None or load is None or experiment.instrument.relative or recording.read.sphere_m:
+        return 0.0
+    same = np.abs(load[:, 1] - load[0, 1]) < HELD * np.ptp(load[:, 1])
+    first = load[: int(np.argmin(same)), 1]
+    if len(first) < FEWEST_BEFORE or abs(tare := float(np.median(first))) <= np.std(first):
+        return 0.0
+    given = recording.time_s - start_s, recording.readings
+    rest = _left(replace(experiment, offset=True), (record, record - (0.0, tare)), *given)
+    better = chdtri(1, SURELY) / min(len(load), _MOST_READINGS)
+    return tare if rest[0] > rest[1] * np.exp(better if load[0, 0] >= start_s else -better) else 0.0
+
+
+def _left(
+    experiment: Experiment, records: Sequence[Array], time_s: Array, readings: Array
+) -> list[float]:
+    """Return the mean square that any sample leaves under each record."""
     some = np.unique(np.linspace(0, len(time_s) - 1, _MOST_READINGS).astype(np.int64))
     lags = spread_lags(experiment.torque, time_s, _LAGS_A_DECADE)
-    nuisance = experiment.nuisance(time_s[some])
-    rest = []
-    for own in (experiment, replace(experiment, record=smooth)):
+    nuisance, rest = experiment.nuisance(time_s[some]), []
+    for record in records:
+        own = replace(experiment, record=record)
         responses = without(nuisance, lag_course(own.torque, lags)(time_s[some]))
         rest.append(fit_responses(without(nuisance, readings[some]), responses)[1])
-    better = rest[0] > rest[1] * np.exp(_BETTER / len(some))
-    return (smooth, noise) if better else (experiment.record, 0.0)
+    return rest
 
 
 def smoothed(values: Array) -> Array:

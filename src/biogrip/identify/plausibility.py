@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from operator import itemgetter
 
 import numpy as np
+from scipy.special import ndtri
 
 from biogrip.arrays import Array
 from biogrip.digits import plain
@@ -17,6 +18,7 @@ from biogrip.errors import BiogripError
 from biogrip.fit.any_sample import fit_responses
 from biogrip.fit.experiment import Experiment
 from biogrip.judging.levels import (
+    BELOW_ZERO,
     FAR_ABOVE,
     LARGEST_SHARE,
     NO_RESPONSE,
@@ -25,8 +27,8 @@ from biogrip.judging.levels import (
 )
 from biogrip.physics.modes import lag_course
 from biogrip.physics.noise import nuisance_basis, without
-from biogrip.physics.protocol import Course, largest_load
-from biogrip.traces.columns import TIME_UNITS
+from biogrip.physics.protocol import SWEEP, Course, largest_load
+from biogrip.traces.columns import TIME_UNITS, place
 from biogrip.traces.reader import Recording
 
 # Distance from the median, over that of all but a tenth, of what is no reading.
@@ -38,6 +40,11 @@ _LAG_SHARES = (1e-9, 0.03, 0.1, 0.3, 1.0, 10.0)
 _FAR_LIKELIER = -2 * math.log(NO_RESPONSE)
 # Share of a function's norm that may be rounding error.
 _ROUNDING = 1e-9
+# What makes a loss modulus negative, and a storage modulus.
+_NEGATIVE = (
+    "The sample would give energy instead of losing it: the phase has the wrong sign or an offset",
+    "The phase is beyond 90 degrees, as where inertia outweighs the sample at high frequencies",
+)
 # Multiple of the free rotation beyond which its square could overflow.
 _ABSURD = 1e9
 
@@ -55,26 +62,10 @@ def check_recording(
     trace shows only errors of the instrument. A trace in a wrong unit fails one of these checks.
     Without arms, nothing limits a reading.
 
-    Parameters
-    ----------
-    recording
-        Trace, its times counted from the start of the protocol; if that is known, readings before
-        it are allowed.
-    experiment
-        What it was recorded with.
-    noise_sd
-        Typical standard deviation of the noise, if it is given: a small rotation passes if that is
-        far smaller still.
-
-    Returns
-    -------
-    str or None
-        A sentence on a rotation that passes only since the given noise is far smaller.
-
-    Raises
-    ------
-    BiogripError
-        With file, line, column, what was found and allowed, and a unit that would be plausible.
+    The times of the recording count from the start of the protocol; if that is known, readings
+    before it are allowed. If the typical standard deviation of the noise is given, a small rotation
+    passes if that is far smaller still, and the sentence on it is returned. A `BiogripError` has
+    file, line, column, what was found and allowed, and a unit that would be plausible.
     """
     torque, instrument = experiment.torque, experiment.instrument
     _check_times(recording, torque)
@@ -127,6 +118,22 @@ def check_recording(
         return None
     turn = float(np.abs(amplitudes @ responses).max())
     return _check_turn(recording, turn, free, noise_sd)
+
+
+def check_moduli(sweep: Recording, sd: Array | float) -> None:
+    """Refuse a sweep with a modulus further below zero than noise takes that of a sample.
+
+    The noise has standard deviations `sd`, (n_samples,), 0 where nothing says it.
+    """
+    least = np.broadcast_to(sd * ndtri(BELOW_ZERO), sweep.readings.shape)
+    for sample in np.flatnonzero(sweep.readings <= least)[:1]:
+        at, found = float(sweep.time_s[sample]), sweep.readings[sample]
+        above = f"{plain(least[sample], 2)} by the noise that is given" if least[sample] else "0"
+        raise BiogripError(
+            f"{place(sweep.path, int(sweep.lines[sample]))}: found a modulus of {found:.3g}, at "
+            f"{SWEEP.place(at)}; allowed is one above {above}. {_NEGATIVE[at > 0]}, or it is below "
+            "the noise: say how much that is (--noise), or leave these rows out (--from, --until)."
+        )
 
 
 def _either_sign(trace: Array, responses: Array, nuisance: Array) -> list[tuple[Array, float]]:

@@ -22,11 +22,12 @@ from biogrip.errors import BiogripError
 from biogrip.fit.any_sample import proportional_deviations, swept_deviations
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.genome import GeneRange
-from biogrip.identify.load_noise import without_noise
-from biogrip.identify.plausibility import check_recording
+from biogrip.identify.load_noise import tare_of, without_noise
+from biogrip.identify.plausibility import check_moduli, check_recording
+from biogrip.judging.levels import ALIKE, ONE_STEP, REPEATED
 from biogrip.judging.onset import OnsetFits, estimate_onset
 from biogrip.physics.fractional import LONGEST_S, SHORTEST_S
-from biogrip.physics.noise import MOST_SAMPLES, drift_is_flow, estimate_noise
+from biogrip.physics.noise import MOST_SAMPLES, drift_is_flow, estimate_noise, measure_rounding
 from biogrip.physics.protocol import Course, is_held, largest_load, with_steps
 from biogrip.traces.columns import place
 from biogrip.traces.reader import Recording
@@ -62,6 +63,12 @@ def prepare(recording: Recording, experiment: Experiment) -> tuple[Recording, Ex
             # A log may write all of them alike, as in the first row after each.
             uncertainty["all steps"] = {"share": 1.0}
         experiment = replace(experiment, record=record, uncertainty=uncertainty)
+        if tare := tare_of(experiment, recording):
+            controlled = experiment.instrument.controlled
+            size = f"{plain(tare)} {controlled.unit}".rstrip()
+            said = f"Taken off the {controlled.name}, a tare that readings do not follow: {size}."
+            recording = replace(recording, remarks_before=(*recording.remarks_before, said))
+            experiment = replace(experiment, record=record - (0.0, tare))
     recording = _checked(recording, experiment)
     if experiment.record is not None:
         record, noise = without_noise(experiment, recording.time_s, recording.readings)
@@ -101,6 +108,8 @@ def _checked(trace: Recording, experiment: Experiment) -> Recording:
             f"{MOST_SAMPLES} with {'weights' if weighted else 'a coloured noise model'}: average "
             "neighbouring ones."
         )
+    if not experiment.instrument.sweeps:
+        trace = without_repeats(trace)
     onset_s = trace.read.start_s
     if experiment.fit_start:
         onset_s = estimate_onset(experiment, trace.time_s, trace.readings)
@@ -131,7 +140,9 @@ def _checked(trace: Recording, experiment: Experiment) -> Recording:
 
 def _with_deviations(sweep: Recording, share: float | None, noise_sd: float | None) -> Recording:
     """Return a sweep with standard deviations of its readings, or of their ratios."""
-    if sweep.sd is not None or (share is None and noise_sd is not None):
+    known = noise_sd if sweep.sd is None and share is None else sweep.sd
+    check_moduli(sweep, 0.0 if known is None else known)
+    if known is not None:
         return sweep
     sd, shares = swept_deviations(sweep.time_s, sweep.readings, share, noise_sd or 0.0)
     if share is not None:
@@ -151,6 +162,27 @@ def without_steps(trace: Recording, protocol: Course) -> Recording:
     at = np.isin(protocol.snapped(trace.time_s), protocol.jumps_s)
     times = trace.time_s[at] + (trace.onset_s or 0.0)
     return replace(trace.part(~at), at_steps=tuple(times.tolist()))
+
+
+def without_repeats(trace: Recording) -> Recording:
+    """Keep one of each reading of a sensor that is read less often than it is logged.
+
+    Rounded readings repeat, too, but change by one step; a sensor may stand still for long.
+    """
+    changes = np.diff(trace.readings)
+    kept = np.append(True, changes != 0)
+    at_ends = np.abs(changes[1:][~kept[1:-1] & kept[2:]])
+    runs = np.diff(np.append(np.flatnonzero(kept), len(kept)))
+    held = np.mean(~kept) > REPEATED and np.max(runs) <= ALIKE * np.median(runs)
+    if not (
+        held and len(at_ends) and np.median(at_ends) > ONE_STEP * measure_rounding(trace.readings)
+    ):
+        return trace
+    said = (
+        "Left out, for they repeat the one before, as of a sensor that is read less often than it "
+        f"is logged: {np.count_nonzero(~kept)} of {len(kept)} readings."
+    )
+    return replace(trace.part(kept), remarks_before=(*trace.remarks_before, said))
 
 
 def without_padding(trace: Recording) -> Recording:

@@ -45,7 +45,7 @@ from biogrip.judging.whiteness import (
     uneven,
     wandering,
 )
-from biogrip.physics.noise import MOST_SAMPLES, NoiseModel, estimate_noise, without
+from biogrip.physics.noise import MOST_SAMPLES, ROOT_12, NoiseModel, estimate_noise, without
 from biogrip.physics.residuals import Residuals
 
 HARMLESS, DOUBT, REJECTION = "harmless", "doubt", "rejection"
@@ -53,6 +53,9 @@ HARMLESS, DOUBT, REJECTION = "harmless", "doubt", "rejection"
 
 OK, DOUBTFUL, REJECTED = "ok", "doubtful", "rejected"
 """Status of a fit by the heaviest of its notes."""
+
+ROUNDED = "The readings are rounded"
+"""Beginning of the note on errors of rounding."""
 
 _STATUS = {HARMLESS: OK, DOUBT: DOUBTFUL, REJECTION: REJECTED}
 _WEIGHTS = tuple(_STATUS)
@@ -166,9 +169,17 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
         scale = max(scale, estimate_noise(standard, rounding))
     left = _Left(likelihood, growth, struck, standard[~struck], basis, scale)
     certain = left.correlation[1] < levels.CERTAIN_MISFIT and left.times > levels.TOO_MUCH
-    if not certain or left.lines:
-        return Remainder(partial(_find_notes, left))
-    found, worth = _misfit(left, residual, slopes)
+    found, worth = None, None
+    if certain and not left.lines:
+        found, worth = _misfit(left, residual, slopes)
+    small = misfit <= levels.TOO_MUCH * rounding / ROOT_12 and np.max(np.abs(residual)) <= rounding
+    small &= not residuals.course.sweeps and not residuals.coloured
+    if small and likelihood.freedom < np.inf:
+        # All errors of one reading count as one, of which a fit may absorb most.
+        _, counts = np.unique(residuals.trace.readings, return_counts=True)
+        share = min(misfit * ROOT_12 / rounding, 1.0) ** 2
+        worth = share * residuals.samples**2 / float(np.sum(counts**2)), residuals.samples
+        return Remainder(partial(_find_notes_of_rounding, left, found), worth)
     return Remainder(partial(_find_notes, left, found), worth)
 
 
@@ -210,6 +221,18 @@ def _find_notes(left: _Left, misfit: Note | None = None) -> list[Note]:
     return notes
 
 
+def _find_notes_of_rounding(left: _Left, misfit: Note | None = None) -> list[Note]:
+    """Return the note on errors of rounding in place of those of `_find_notes`."""
+    residuals = left.likelihood.problem.residuals
+    size = f"{plain(residuals.trace.rounding, 2)} {residuals.instrument.read.unit}".rstrip()
+    text = (
+        f"{ROUNDED} to steps of {size}, more than their noise, or are cut off there. The limits "
+        "allow for one error wherever a reading is the same."
+    )
+    status = compute_status(_find_notes(left, misfit))
+    return [Note(HARMLESS if status == OK else DOUBT, text)]
+
+
 def _misfit(left: _Left, residual: Array, slopes: Array) -> tuple[Note, tuple[float, float] | None]:
     """Return the note on a misfit, and its worth and freedom if limits allow for it."""
     residuals, times, scale = left.likelihood.problem.residuals, left.times, left.scale
@@ -220,17 +243,12 @@ def _misfit(left: _Left, residual: Array, slopes: Array) -> tuple[Note, tuple[fl
             "standard deviations (--sd)."
         )
         return Note(DOUBT, text), None
-    more, read = plain(times, 2), residuals.trace.readings
+    more = plain(times, 2)
     share = scale * float(np.sqrt(times**2 - 1)) / residuals.peak
     relative = residuals.course.sweeps and residuals.coloured
     of_peak = f"{plain(100 * share, 2)} % of the {'moduli' if relative else 'peak'}"
     suspects = name_suspects(residuals, times, scale)
-    if not residuals.trace.rounding and np.mean(read[1:] == read[:-1]) > levels.REPEATED:
-        text = (
-            "Most readings repeat the one before, as of a sensor that is read less often than it "
-            "is logged: keep one of each."
-        )
-    elif not residuals.course.sweeps and has_fast_noise(residuals, residual, slopes):
+    if not residuals.course.sweeps and has_fast_noise(residuals, residual, slopes):
         text = (
             f"The misfit is {more} times the noise of neighbouring readings, as of noise that is "
             "correlated for a short time."

@@ -32,9 +32,10 @@ TOO_LITTLE = 0.5
 CLEARLY = 3.0
 """Growth of noise from which on its share is known, and unweighted fits are not compared."""
 
-REPEATED = 0.45
+REPEATED, ALIKE, ONE_STEP = 0.45, 12.0, 1.5
 """Share of readings that repeat the one before if a sensor is logged more often than it is read:
-half or more if it is logged twice as often."""
+half or more if it is logged twice as often; how many times the usual run the longest may be, as if
+it is read at random; and the change after a run, in steps of rounding, which repeats alone."""
 
 # Slow noise, which may be misfit.
 
@@ -155,6 +156,10 @@ SHORTEST_SHARE = 0.02
 
 NO_RESPONSE = 1e-3
 """Share of traces of pure noise that are accepted as a response."""
+
+BELOW_ZERO = 1e-6
+"""Level, for each modulus of a sweep, at which one below zero is no noise: hardly one of 10,000
+right sweeps is refused."""
 
 FAR_ABOVE = 10.0
 """Multiple of a given noise from which a rotation is seen, however small it is."""

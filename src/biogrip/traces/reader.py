@@ -30,16 +30,6 @@ from biogrip.traces.tables import (
 )
 
 FEWEST_SAMPLES = 5
-# What makes a modulus negative.
-_CAUSES = {
-    "frequency": "",
-    "storage modulus": " The phase is beyond 90 degrees, as where inertia outweighs the sample at "
-    "high frequencies: correct for it, or leave these rows out (--until). Of a liquid it may be "
-    "noise.",
-    "loss modulus": " The sample would give energy instead of losing it: the phase has the wrong "
-    "sign or an offset, or the loss is below the noise: then leave these rows out (--from, "
-    "--until, or no number in the cell).",
-}
 _PLURALS = {"time": "times", "frequency": "frequencies"}
 # Relative to the last time: smaller steps are damaged numbers, not a clock's.
 _SHORTEST_STEP = 1e-18
@@ -176,18 +166,14 @@ def is_usual(recording: Recording) -> bool:
 def read_recording(path: Path, columns: Columns) -> Recording:
     """Read the columns of a recorded trace from a file.
 
-    The file is text in UTF-8, UTF-16 or Windows-1252. Empty lines and lines that start with ``#``
-    are ignored. The header is the line that has the columns, or has a row of units below it; of
-    several such tables, ``block`` says which. The header decides the separator: comma, semicolon or
-    tab. With the last two, numbers may have a decimal comma; one table has one decimal mark, and
-    other marks are between thousands. Times may be hours:minutes:seconds, after a date or not.
-    Cells may be quoted and padded with blanks, but a quoted cell ends on its line. Other columns
-    may hold anything.
+    The header is the line that has the columns, or has a row of units below it; of several such
+    tables, ``block`` says which. With semicolons or tabs between cells numbers may have a decimal
+    comma; one table has one decimal mark, and other marks are between thousands. Times may be
+    hours:minutes:seconds, after a date or not. Other columns may hold anything.
 
     An empty cell, ``nan``, ``NA``, ``N/A``, ``#N/A``, ``#NV`` (in any case) or ``-`` is a gap. Its
-    row is left out and counted; nothing is interpolated. Other spreadsheet errors, as ``#REF!``,
-    are refused. A `BiogripError` has file, line and column of what cannot be used, and what is
-    allowed.
+    row is left out and counted; nothing is interpolated. A `BiogripError` has file, line and column
+    of what cannot be used, and what is allowed.
     """
     sheet, quantity = read_sheet(path, columns), columns.quantity
     if columns.reading == quantity.name and quantity.name not in sheet.cells:
@@ -334,27 +320,23 @@ def _as_in(names: Sequence[str]) -> str:
 def _both_moduli(
     path: Path | None, columns: Columns, units: list[str], values: Array, lines: IntArray
 ) -> tuple[Array, Array]:
-    """Return storage and loss moduli of a sweep, (n_rows,) in SI units, all above zero."""
+    """Return storage and loss moduli of a sweep, (n_rows,) in SI units."""
     partner, read = columns.partner, columns.quantity
     assert partner is not None
+    for row in np.flatnonzero(values[:, 0] <= 0)[:1]:
+        found = f"found a frequency of {values[row, 0]:.3g}; allowed is one above 0"
+        raise BiogripError(f"{place(path, lines[row])}: {found}.")
     first = values[:, 1] * (read.units[units[1]] * columns.scale)
     second = values[:, 2] * partner.units[units[2]]
     is_whole = read.name == "complex_modulus"
     if partner.unit == read.unit:
         loss = second * columns.scale
-        storage = np.sqrt(np.maximum(first**2 - loss**2, 0.0)) if is_whole else first
+        square = first**2 - loss**2
+        storage = np.sign(square) * np.sqrt(np.abs(square)) if is_whole else first
     else:
         phase = second if partner == PHASE else np.arctan(second)
         storage = first * np.cos(phase) if is_whole else first
         loss = storage * np.tan(phase)
-    moduli_of = {"frequency": values[:, 0], "storage modulus": storage, "loss modulus": loss}
-    for name, moduli in moduli_of.items():
-        for row in np.flatnonzero(moduli <= 0)[:1]:
-            what, at = _CAUSES[name], f"{values[row, 0]:g} {units[0]}"
-            raise BiogripError(
-                f"{place(path, lines[row])}: found a {name} of {moduli[row]:.3g}, at {at}; "
-                f"allowed is one above 0.{what}"
-            )
     return storage, loss
 
 
