@@ -1,5 +1,6 @@
 """What was held or loaded: its unit, and a column of it, which is the protocol of all rows."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -130,6 +131,31 @@ def test_limits_allow_for_steps_anywhere_between_two_rows(
     assert 0.1 < width[0] < 0.3
     assert width[3] < 0.05
     assert trace_data(diagnosis)["limits"].startswith(f"Limits allow for {len(at_s)} step")
+
+
+@pytest.mark.parametrize("late_rows", [0.0, 0.5, -0.5])
+def test_the_clock_of_a_smooth_load_is_doubted(tmp_path: Path, late_rows: float) -> None:
+    """The creep of a Zener solid under 5 Pa sin(pi t), from its equation, and rows of 0.05 s."""
+    clock, tau_s = np.arange(0.0, 30.0, 0.05), 0.5
+    turn = np.pi * clock
+    delayed = np.sin(turn) - np.pi * tau_s * (np.cos(turn) - np.exp(-clock / tau_s))
+    strain = 5 * (np.sin(turn) / 500 + delayed / 300 / (1 + (np.pi * tau_s) ** 2))
+    strain += np.random.default_rng(2).normal(0, 1e-4, len(clock))
+    logged = 5 * np.sin(np.maximum(turn - np.pi * 0.05 * late_rows, 0.0))
+    model = Setting("--model", ("sample", "model"), "zener_kelvin")
+    recording, case = read_trace(loaded(tmp_path / "log.csv", clock, strain, logged, more=[model]))
+    alone = replace(case.judged_experiment, models=(), usual_models=False)
+    diagnosis = identify(recording, alone)
+    k_s = diagnosis.findings[0]
+    assert ((k_s.low or 0.0) < 500 < (k_s.high or np.inf)) == (not late_rows)
+    said = [note.text for note in diagnosis.notes if "seems to be logged" in note.text]
+    assert diagnosis.status == ("doubtful" if said else "ok")
+    assert len(said) == bool(late_rows)
+    for text in said:
+        (late_s,) = re.findall(
+            r"logged ([\d.]+) s too " + ("late" if late_rows > 0 else "early"), text
+        )
+        assert float(late_s) == pytest.approx(0.025, rel=0.3)
 
 
 @pytest.mark.parametrize("first_s", [0.5, 0.0])

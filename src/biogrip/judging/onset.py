@@ -27,10 +27,11 @@ from biogrip.digits import instant, plain
 from biogrip.fit.any_sample import fit_any_sample, fit_responses, spread_lags
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import LeastSquaresSettings, fit_from, identify_many
+from biogrip.fit.noise_model_fit import absorbed
 from biogrip.fit.problem import TraceProblem, silent
 from biogrip.judging import levels
 from biogrip.judging.diagnosis import RING, Diagnosis
-from biogrip.judging.doubts import DOUBT, HARMLESS, REJECTED, REJECTION, Note
+from biogrip.judging.doubts import DOUBT, HARMLESS, MANY, REJECTED, REJECTION, Note
 from biogrip.judging.likelihood import Likelihood, compute_fall, make_likelihood
 from biogrip.judging.profiles import Profile, compute_profiles
 from biogrip.judging.verdicts import Finding
@@ -290,6 +291,9 @@ def notes_on_start(
                 notes += _about_tare(fits, diagnosis, onset_s)
     if diagnosis.status != REJECTED and ramped and not notes:
         notes += _about_ramp(fits, diagnosis, ramped)
+    steps = experiment.uncertainty.get("steps")
+    if experiment.record is not None and not steps and len(time_s) <= MANY:
+        notes += _about_load(fits, diagnosis)
     return notes
 
 
@@ -328,6 +332,28 @@ def _about_tare(fits: OnsetFits, diagnosis: Diagnosis, onset_s: float) -> Iterat
             REJECTION if diagnosis.status == REJECTED else DOUBT,
             f"The {len(before)} readings before the start are constant, but {plain(mean)}{unit} "
             "and not 0: if that is the zero of the instrument, say --offset (measurement.offset).",
+        )
+
+
+def _about_load(fits: OnsetFits, diagnosis: Diagnosis) -> Iterator[Note]:
+    """Yield a note if a recorded load that comes earlier or later, to first order, fits better."""
+    given = fits.given(diagnosis.likelihood)
+    aside_s = _EARLIER * spacing_at(fits.time_s, 0.0)
+    here, later = (fits.posed(start_s).residuals for start_s in (0.0, aside_s))
+    residual, slopes = here(given.log_parameters)
+    basis = absorbed(np.vstack((slopes, here.trace.condensed.nuisance)))
+    moved = without(basis, later.left(given.log_parameters) - residual)
+    late_s = -aside_s * float(moved @ residual) / float(moved @ moved)
+    other = fits.at(late_s, given.log_parameters)
+    fall = compute_fall(len(residual), given.misfit, other.misfit, fits.experiment.noise_sd)
+    values = _moved(diagnosis, given, [other], 0.5)
+    if fall > chdtri(1, levels.FALSE_ALARM) and values:
+        name = fits.experiment.instrument.controlled.name
+        yield Note(
+            DOUBT,
+            f"The {name} seems to be logged {plain(abs(late_s), 2)} s too "
+            f"{'early' if late_s > 0 else 'late'}: moved by that, it fits far better (χ² falls by "
+            f"{plain(fall)}), and {values}. Correct its times if the logger or a filter delays it.",
         )
 
 
