@@ -143,6 +143,9 @@ def test_coinciding_roots_are_moved_apart_about_their_mean() -> None:
     assert found[2] == -1.0
     near = separate(np.array([[-3.0, 1.0 - 1e-6, -1.0]], dtype=complex), origin) - origin
     assert (near[0, 1] - near[0, 0]).real == pytest.approx(3 * SMALLEST_GAP, rel=1e-6)
+    two_pairs = np.array([[-3.0, -1.0, -3.0, -1.0]], dtype=complex)
+    apart = np.sort(separate(two_pairs, np.zeros((1, 4)))[0].real)
+    assert np.diff(apart)[[0, 2]] == pytest.approx([3 * SMALLEST_GAP, SMALLEST_GAP], rel=1e-6)
 
 
 def test_a_place_in_a_sweep_names_modulus_and_frequency() -> None:
