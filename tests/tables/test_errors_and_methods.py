@@ -8,7 +8,14 @@ from scipy.stats import binomtest
 
 from biogrip.fit.problem import METHODS
 from biogrip.physics.models import MODELS, Published, Sample
-from biogrip.records.identifications import ALL, MODEL_FITS, basins, columns, near_noise
+from biogrip.records.identifications import (
+    ALL,
+    MODEL_FITS,
+    basins,
+    columns,
+    near_noise,
+    share_with_limits,
+)
 from biogrip.records.rows import write_object
 from biogrip.tables import cases
 from biogrip.tables.study import methods, models
@@ -102,6 +109,11 @@ def test_methods_are_counted_against_what_genes_can_encode(tmp_path: Path) -> No
     assert first["encodable_rise"] == second["encodable_rise"] == pytest.approx(60.9)
     ends = binomtest(1, 3).proportion_ci(method="wilson")
     np.testing.assert_allclose([first["reached_low"], first["reached_high"]], ends, rtol=1e-6)
+    # What is never reached has 0 for its lower end, and no rounding error.
+    for count, end in ((0, 0), (500, 1)):
+        ends = share_with_limits(count, 500)[1:]
+        assert ends == pytest.approx(binomtest(count, 500).proportion_ci(method="wilson"))
+        assert ends[end] == end
     assert second["median_evaluations"] == 11
     assert first["error_percent k"] == pytest.approx(20.0)
     assert first["error_percent c + c_p"] == pytest.approx(0.0)

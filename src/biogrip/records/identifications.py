@@ -239,7 +239,8 @@ def share_with_limits(count: int, runs: int) -> tuple[float, float, float]:
     z, share = NormalDist().inv_cdf(0.975), count / runs
     middle = (share + z * z / (2 * runs)) / (1 + z * z / runs)
     half = z * math.sqrt((share * (1 - share) + z * z / (4 * runs)) / runs) / (1 + z * z / runs)
-    return share, max(middle - half, 0.0), min(middle + half, 1.0)
+    # Of none and of all, an end is exact but for rounding.
+    return share, middle - half if count else 0.0, middle + half if count < runs else 1.0
 
 
 def share_in_words(count: int, runs: int) -> str:
