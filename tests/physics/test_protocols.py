@@ -18,6 +18,7 @@ from biogrip.physics.models import Sample, generalized_maxwell
 from biogrip.physics.protocol import (
     SWEEP,
     Course,
+    Phase,
     evaluate,
     hold,
     join_phases,
@@ -146,6 +147,13 @@ def test_coinciding_roots_are_moved_apart_about_their_mean() -> None:
     two_pairs = np.array([[-3.0, -1.0, -3.0, -1.0]], dtype=complex)
     apart = np.sort(separate(two_pairs, np.zeros((1, 4)))[0].real)
     assert np.diff(apart)[[0, 2]] == pytest.approx([3 * SMALLEST_GAP, SMALLEST_GAP], rel=1e-6)
+
+
+def test_the_torque_of_a_ramp_of_voltage_is_its_square() -> None:
+    """0.5 (3 + 2 t)^2 at 0, 1 and 4 s, and a quarter of it."""
+    torque = Phase(5.0, 3.0, 2.0).squared(0.5)
+    assert torque.at([0.0, 1.0, 4.0]).tolist() == [4.5, 12.5, 60.5]
+    assert torque.divided(4.0).at(4.0) == 60.5 / 4
 
 
 def test_a_place_in_a_sweep_names_modulus_and_frequency() -> None:
