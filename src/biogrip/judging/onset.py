@@ -255,6 +255,8 @@ _SHARES = np.sin(np.pi * np.arange(1, 5) / 10)
 _FIRST_STEP, _MOST = 1 / 64, 0.25
 # Start that is earlier by so much of an interval, for differences.
 _EARLIER = 0.1
+# Newton steps that move a load along the clock.
+_STEPS_OF_CLOCK = 3
 # Share of what a start has to gain that any sample has to where it was guessed.
 _MOSTLY = 0.5
 # Accuracy of an end of the onset's interval, as a share of its distance.
@@ -336,19 +338,21 @@ def _about_tare(fits: OnsetFits, diagnosis: Diagnosis, onset_s: float) -> Iterat
 
 
 def _about_load(fits: OnsetFits, diagnosis: Diagnosis) -> Iterator[Note]:
-    """Yield a note if a recorded load that comes earlier or later, to first order, fits better."""
-    given = fits.given(diagnosis.likelihood)
+    """Yield a note if a recorded load that comes earlier or later fits better, by Newton steps."""
+    given = other = fits.given(diagnosis.likelihood)
     aside_s = _EARLIER * spacing_at(fits.time_s, 0.0)
-    here, later = (fits.posed(start_s).residuals for start_s in (0.0, aside_s))
-    residual, slopes = here(given.log_parameters)
-    basis = absorbed(np.vstack((slopes, here.trace.condensed.nuisance)))
-    moved = without(basis, later.left(given.log_parameters) - residual)
-    late_s = -aside_s * float(moved @ residual) / float(moved @ moved)
-    other = fits.at(late_s, given.log_parameters)
+    for _ in range(_STEPS_OF_CLOCK):
+        starts_s = other.onset_s, other.onset_s + aside_s
+        here, later = (fits.posed(start_s).residuals for start_s in starts_s)
+        residual, slopes = here(other.log_parameters)
+        basis = absorbed(np.vstack((slopes, here.trace.condensed.nuisance)))
+        moved = without(basis, later.left(other.log_parameters) - residual)
+        step_s = -aside_s * float(moved @ residual) / float(moved @ moved)
+        other = fits.at(other.onset_s + step_s, other.log_parameters)
     fall = compute_fall(len(residual), given.misfit, other.misfit, fits.experiment.noise_sd)
     values = _moved(diagnosis, given, [other], 0.5)
     if fall > chdtri(1, levels.FALSE_ALARM) and values:
-        name = fits.experiment.instrument.controlled.name
+        name, late_s = fits.experiment.instrument.controlled.name, other.onset_s
         yield Note(
             DOUBT,
             f"The {name} seems to be logged {plain(abs(late_s), 2)} s too "
