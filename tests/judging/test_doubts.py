@@ -20,6 +20,7 @@ from biogrip.judging.doubts import (
     has_fast_noise,
 )
 from biogrip.judging.likelihood import make_likelihood
+from biogrip.library import identify_trace
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.noise import AR1, Noise, NoiseModel, Outliers, add_noise
 from tests.helpers.default import seen
@@ -224,3 +225,15 @@ def test_rounding_is_named_and_limits_allow_for_it() -> None:
     limits, truth = found.to_frame().loc[["k", "k_p", "c"]], [3000, 1510, 6000]
     assert np.all((limits["low"] < truth) & (limits["high"] > truth))
     assert np.all(limits["high"] < 3 * limits["low"])
+
+
+def test_rounding_rejects_no_trace_that_has_long_come_to_rest() -> None:
+    """Most readings of a creep are the same, which a fit follows: few errors tell of rounding."""
+    time_s = np.arange(0.1, 60.0, 0.1)
+    strain = 100 * (1 / 2000 + (1 / 800 - 1 / 2000) * (1 - np.exp(-time_s / 5)))
+    found = identify_trace(
+        *(time_s, 0.01 * np.round(strain / 0.01)), reads="strain", hold=100, model="zener_kelvin"
+    )
+    assert found.status == DOUBTFUL
+    limits, truth = found.to_frame().loc[["k_s", "k_v", "c_v"]], [2000, 4000 / 3, 20000 / 3]
+    assert np.all((limits["low"].fillna(0.0) < truth) & (limits["high"].fillna(np.inf) > truth))

@@ -30,6 +30,7 @@ from biogrip.judging.doubts import (
     HARMLESS,
     REJECTED,
     REJECTION,
+    ROUNDED,
     Note,
     Remainder,
     compute_status,
@@ -254,7 +255,10 @@ def _with_notes(judged: Diagnosis, of_rest: list[Note], model: SampleModel) -> D
         for finding in findings
         if finding.gaps
     ]
-    notes += [*_range_ends(likelihood, model), *of_rest, *_too_slow(judged)]
+    notes += [*_range_ends(likelihood, model), *of_rest]
+    # Limits that allow for rounding hold, however wide they are.
+    if not any(note.text.startswith(ROUNDED) for note in of_rest):
+        notes += _too_slow(judged)
     notes += _pulling(grip, residuals.duration_s)
     if not judged.converged:
         text = (

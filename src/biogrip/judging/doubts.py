@@ -178,7 +178,7 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
         # All errors of one reading count as one, of which a fit may absorb most.
         _, counts = np.unique(residuals.trace.readings, return_counts=True)
         share = min(misfit * ROOT_12 / rounding, 1.0) ** 2
-        worth = max(share * residuals.samples**2 / float(np.sum(counts**2)), 1.0), residuals.samples
+        worth = share * residuals.samples**2 / float(np.sum(counts**2)), residuals.samples
         return Remainder(partial(_find_notes_of_rounding, left, found), worth)
     return Remainder(partial(_find_notes, left, found), worth)
 
