@@ -158,6 +158,19 @@ def test_the_clock_of_a_smooth_load_is_doubted(tmp_path: Path, late_rows: float)
         assert float(late_s) == pytest.approx(0.025, rel=0.3)
 
 
+def test_a_load_that_tells_no_clock_is_left_alone(tmp_path: Path) -> None:
+    """Under a ramp an earlier load is a little more of what is there, whatever the sample."""
+    clock, load = np.arange(0.0, 30.0, 0.1), 0.2 * np.arange(0.0, 30.0, 0.1)
+    strain = load / 500 + (load - 0.1 * (1 - np.exp(-clock / 0.5))) / 300
+    strain += 0.01 * strain.max() * np.random.default_rng(1).standard_normal(len(clock))
+    model = Setting("--model", ("sample", "model"), "zener_kelvin")
+    recording, case = read_trace(loaded(tmp_path / "log.csv", clock, strain, load, more=[model]))
+    alone = replace(case.judged_experiment, models=(), usual_models=False)
+    diagnosis = identify(recording, alone)
+    assert diagnosis.status == "ok"
+    assert not [note for note in diagnosis.notes if "seems to be logged" in note.text]
+
+
 @pytest.mark.parametrize("first_s", [0.5, 0.0])
 def test_a_load_that_is_there_in_the_first_row_came_before_it(
     tmp_path: Path, first_s: float

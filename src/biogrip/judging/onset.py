@@ -255,8 +255,9 @@ _SHARES = np.sin(np.pi * np.arange(1, 5) / 10)
 _FIRST_STEP, _MOST = 1 / 64, 0.25
 # Start that is earlier by so much of an interval, for differences.
 _EARLIER = 0.1
-# Newton steps that move a load along the clock.
-_STEPS_OF_CLOCK = 3
+# Newton steps that move a load along the clock, and by how many readings at most; share of squares
+# of what moves that is rounding.
+_STEPS_OF_CLOCK, _MOST_ROWS, _TOLD = 3, 3.0, 1e-6
 # Share of what a start has to gain that any sample has to where it was guessed.
 _MOSTLY = 0.5
 # Accuracy of an end of the onset's interval, as a share of its distance.
@@ -293,8 +294,8 @@ def notes_on_start(
                 notes += _about_tare(fits, diagnosis, onset_s)
     if diagnosis.status != REJECTED and ramped and not notes:
         notes += _about_ramp(fits, diagnosis, ramped)
-    steps = experiment.uncertainty.get("steps")
-    if experiment.record is not None and not steps and len(time_s) <= MANY:
+    smooth = experiment.record is not None and not experiment.uncertainty.get("steps")
+    if smooth and not experiment.coloured and len(time_s) <= MANY:
         notes += _about_load(fits, diagnosis)
     return notes
 
@@ -338,26 +339,39 @@ def _about_tare(fits: OnsetFits, diagnosis: Diagnosis, onset_s: float) -> Iterat
 
 
 def _about_load(fits: OnsetFits, diagnosis: Diagnosis) -> Iterator[Note]:
-    """Yield a note if a recorded load that comes earlier or later fits better, by Newton steps."""
+    """Yield a note if a recorded load that comes earlier or later, by Newton steps, fits better."""
     given = other = fits.given(diagnosis.likelihood)
-    aside_s = _EARLIER * spacing_at(fits.time_s, 0.0)
+    needed, spacing_s = chdtri(1, levels.FALSE_ALARM), spacing_at(fits.time_s, 0.0)
     for _ in range(_STEPS_OF_CLOCK):
-        starts_s = other.onset_s, other.onset_s + aside_s
+        starts_s = other.onset_s, other.onset_s + _EARLIER * spacing_s
         here, later = (fits.posed(start_s).residuals for start_s in starts_s)
         residual, slopes = here(other.log_parameters)
         basis = absorbed(np.vstack((slopes, here.trace.condensed.nuisance)))
-        moved = without(basis, later.left(other.log_parameters) - residual)
-        step_s = -aside_s * float(moved @ residual) / float(moved @ moved)
-        other = fits.at(other.onset_s + step_s, other.log_parameters)
-    fall = compute_fall(len(residual), given.misfit, other.misfit, fits.experiment.noise_sd)
+        change = later.left(other.log_parameters) - residual
+        moved = without(basis, change)
+        told = float(moved @ moved)
+        if told <= _TOLD * float(change @ change):
+            return
+        step = -float(moved @ residual) / told
+        if other is given and step**2 * told < needed * given.misfit**2:
+            return
+        late_s = other.onset_s + step * _EARLIER * spacing_s
+        if abs(late_s) > _MOST_ROWS * spacing_s:
+            return
+        other = fits.at(late_s, other.log_parameters)
+    fall_from = partial(compute_fall, len(residual), after=other.misfit)
+    fall = fall_from(given.misfit, noise_sd=fits.experiment.noise_sd)
     values = _moved(diagnosis, given, [other], 0.5)
-    if fall > chdtri(1, levels.FALSE_ALARM) and values:
+    if fall > needed and values:
         name, late_s = fits.experiment.instrument.controlled.name, other.onset_s
+        of_any = fit_any_sample(fits.posed(0.0).residuals).misfit
+        alike = fall_from(of_any) <= needed
         yield Note(
             DOUBT,
             f"The {name} seems to be logged {plain(abs(late_s), 2)} s too "
             f"{'early' if late_s > 0 else 'late'}: moved by that, it fits far better (χ² falls by "
-            f"{plain(fall)}), and {values}. Correct its times if the logger or a filter delays it.",
+            f"{plain(fall)}), and {values}. Correct its times if the logger or a filter delays it."
+            f"{' A linear sample of another kind would fit as well.' if alike else ''}",
         )
 
 
