@@ -88,12 +88,12 @@ def wandering(residual: Array, basis: Array) -> float:
     sizes = np.array([len(part) for part in np.array_split(residual, count)])
     starts = np.append(0, np.cumsum(sizes)[:-1])
 
-    def averaged(rows: Array) -> Array:
+    def means_of(rows: Array) -> Array:
         sums: Array = np.add.reduceat(rows, starts, axis=-1) / np.sqrt(sizes)
         return sums
 
-    observed = float(np.sum(averaged(residual) ** 2) / np.sum(residual**2))
-    means = averaged(basis)
+    observed = float(np.sum(means_of(residual) ** 2) / np.sum(residual**2))
+    means = means_of(basis)
     within = means @ means.T
     first = count - float(np.trace(within))
     second = count - 2 * float(np.trace(within)) + float(np.sum(within**2))

@@ -189,8 +189,9 @@ def _spanning(halvings: int, orders: int, deforms: bool) -> tuple[Array, float, 
     candidates = -np.expm1(np.arange(_SPACING_OF_RATES, last, _SPACING_OF_RATES))
     found = jumps(candidates)
     sizes = np.max(np.abs(found), axis=1, keepdims=True)
-    chosen = _independent(found / sizes)
-    basis, triangle = np.linalg.qr((found / sizes)[:, chosen])
+    columns = found / sizes
+    chosen = _independent(columns)
+    basis, triangle = np.linalg.qr(columns[:, chosen])
     rates, basis = candidates[chosen], basis / sizes
 
     def values(scaled: Array) -> Array:

@@ -112,6 +112,7 @@ def estimate(
     every = parameters_and_sum(experiment.searched)
     selected = [index for index, quantity in enumerate(every) if quantity.label in determined]
     rest_known, informed, truth = _rest_known(case, experiment, time_s, rotation)
+    often = case.block.identifiability.verdicts_every
     progress = Progress(f"{case.name}, intervals", len(seeds))
     rows: list[tuple[Any, ...]] = []
     for group in groups(seeds, _TIMES):
@@ -127,7 +128,6 @@ def estimate(
             simpler = experiment.of_each(time_s, traces, rest_known)
             known[:, informed] = fit_from(simpler, truth[informed]).x
         for in_full, shown in ((True, [*range(len(every))]), (False, selected)):
-            often = case.block.identifiability.verdicts_every
             some = [i for i, seed in enumerate(group) if (seed % often == 0) == in_full]
             if not (some and shown):
                 continue

@@ -183,13 +183,13 @@ class Schema:
         block = "properties" in self.node or self.get("type") == "object"
         return "a block of keys" if block else _WORDS.get(self.get("type"), "a number")
 
-    def with_numbers(self, value: Any) -> Any:
+    def converted(self, value: Any) -> Any:
         """Return a copy of a plain value, see `with_numbers`."""
         here = self.option(kind_of(value))
         if isinstance(value, Mapping):
-            return {name: here.inside(name).with_numbers(it) for name, it in value.items()}
+            return {name: here.inside(name).converted(it) for name, it in value.items()}
         if isinstance(value, list | tuple):
-            return [here.inside(0).with_numbers(item) for item in value]
+            return [here.inside(0).converted(item) for item in value]
         kinds = {option.get("type", "number") for option in (here, *self.options)}
         if isinstance(value, str) and "boolean" in kinds:
             return _SWITCHES.get(value.lower(), value)
@@ -209,7 +209,7 @@ def with_numbers(kind: Any, value: Any) -> Any:
     texts = [it.strip() for _, it in values_in(value) if isinstance(it, str)]
     if any(_NUMBER.fullmatch(text) or text.lower() in _SWITCHES for text in texts):
         # Only then, for a schema takes longer to derive than all else of a config.
-        return schema_of(kind).with_numbers(value)
+        return schema_of(kind).converted(value)
     return value
 
 
