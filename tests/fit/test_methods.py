@@ -61,9 +61,9 @@ def test_evaluations_are_counted(method: str, monkeypatch: pytest.MonkeyPatch) -
     """A derivative is a response; not counted is what settles an optimum, by the processor."""
     posed, counted = problem("liquid_drop_2", 1), [0]
 
-    def settled_silently(*given: Any) -> Any:
+    def settled_silently(*given: Any, **options: Any) -> Any:
         before = counted[0]
-        found = refine(*given)
+        found = refine(*given, **options)
         counted[0] = before
         return found
 

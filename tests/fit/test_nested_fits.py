@@ -63,9 +63,9 @@ def test_no_model_fits_worse_than_one_in_it(case: str, level: float, tried: Sequ
 def test_what_fits_worse_than_one_in_it_is_fitted_again(monkeypatch: pytest.MonkeyPatch) -> None:
     starts = []
 
-    def poor(*given: Any) -> list[Fit]:
+    def poor(*given: Any, **options: Any) -> list[Fit]:
         starts.append(given[-1][0])
-        (fit,) = identify_many(*given)
+        (fit,) = identify_many(*given, **options)
         times = len(starts)
         return [fit.replaced(times * fit.parameters, times * fit.misfit, converged=times == 1)]
 

@@ -15,6 +15,7 @@ from pydantic import Field
 from biogrip.arrays import Array
 from biogrip.fit.problem import Fit, History, Progress, Row, TraceProblem, silent
 from biogrip.keys import Block
+from biogrip.physics.misfit import make_misfit
 
 
 @dataclass(frozen=True)
@@ -53,12 +54,13 @@ def _identified(
     from scipy.optimize import Bounds, differential_evolution
 
     rows: list[Row] = []
+    misfit = make_misfit(problem.residuals)
     evaluations = 0
 
     def ranking(columns: Array) -> Array:
         nonlocal evaluations
         evaluations += columns.shape[1]
-        return problem.residuals.misfit(np.exp(columns.T)).astype(np.float32).astype(float)
+        return misfit(np.exp(columns.T)).astype(np.float32).astype(float)
 
     def row_of(result: Any) -> Row:
         median = float(np.median(result.population_energies))

@@ -39,7 +39,7 @@ _APART = 1e-4
 # Most steps of fair fits with a quantity held.
 _FEW_STEPS = 40
 # Most numbers in the rows that are formed at once.
-_AT_ONCE = 1_000_000
+_AT_ONCE = 300_000
 
 
 def alike(problems: Sequence[TraceProblem]) -> list[IntArray]:
@@ -189,18 +189,21 @@ def identify_many(
     rngs: Sequence[np.random.Generator],
     progress: Progress = silent,
     further: Sequence[Array] | None = None,
+    *,
+    to_last_digits: bool = True,
 ) -> list[Fit]:
     """Identify samples by local fits from the best of many random points.
 
     Further starts of each trace are log-parameters, (n_further, n_parameters). `progress` is called
     after every trace. If the model has no response at any of the points, it is a `BiogripError`.
+    Not refined `to_last_digits`, misfits have nine.
     """
     pairs = zip(problems, rngs, strict=True)
     points = [screened(problem, settings, rng) for problem, rng in pairs]
     starts, before = zip(*points, strict=True)
     if further is not None:
         starts = tuple(map(np.concatenate, zip(starts, further, strict=True)))
-    return best_of_starts(problems, starts, before, progress)
+    return best_of_starts(problems, starts, before, progress, to_last_digits=to_last_digits)
 
 
 def screened(
@@ -228,6 +231,8 @@ def best_of_starts(
     starts: Sequence[Array],
     before: Sequence[Row],
     progress: Progress,
+    *,
+    to_last_digits: bool = True,
 ) -> list[Fit]:
     """Fit every trace from each of its starts and return the optima of lowest misfit.
 
@@ -242,6 +247,7 @@ def best_of_starts(
             [starts[index] for index in group],
             [before[index] for index in group],
             progress,
+            to_last_digits=to_last_digits,
         )
         answers.update(zip(group.tolist(), found, strict=True))
     return [answers[index] for index in range(len(problems))]
@@ -252,11 +258,13 @@ def _best_of_alike(
     starts: Sequence[Array],
     before: Sequence[Row],
     progress: Progress,
+    *,
+    to_last_digits: bool,
 ) -> list[Fit]:
     fits, traces = LocalFits(problems), np.arange(len(problems))
     rough, trace, fine, trace_of_fine = _finished(fits, starts)
     winners = np.concatenate([_best(fine, trace_of_fine == own, 1) for own in traces])
-    best = refine_optima(fits, fine[winners], traces)
+    best = refine_optima(fits, fine[winners], traces, to_last_digits=to_last_digits)
     answers = []
     for own, first_row in enumerate(before):
         rows = _descents(rough[trace == own], first_row)
@@ -355,18 +363,21 @@ _FLAT, _SMALLEST = 1e-12, 1e-150
 _ROUNDING = 1e-15
 
 
-def refine_optima(fits: LocalFits, found: Minima, trace: IntArray) -> Minima:
+def refine_optima(
+    fits: LocalFits, found: Minima, trace: IntArray, *, to_last_digits: bool = True
+) -> Minima:
     """Refine optima by Newton steps until they are stationary to the last digits [2]_.
 
     Descents compare sums of squares, and so find an optimum to half the digits; its vanishing
     gradient locates it to all of them. For an element too weak to be seen, second derivatives of
     the residuals decide how the gradient changes: Gauss-Newton steps need not converge. The first
-    steps are damped, and compared on condensed rows. Each of the last is compared, on all readings,
-    with the point before it, and kept only if it fits no worse.
+    steps are damped, and compared on condensed rows: they give misfits to nine digits. Only if
+    wanted `to_last_digits`, others follow: each is compared, on all readings, with the point before
+    it, and kept only if it fits no worse.
 
     Found are optima, fitted with the finest tolerance, each to the trace of an index, (n,).
-    Returned are optima with misfits on all readings, none above that of `found`, and the
-    evaluations of the refinement; branches sorted by relaxation time. An optimum has converged if
+    Returned are optima with misfits, none above that of `found`, and the evaluations of the
+    refinement; branches sorted by relaxation time. An optimum has converged if
     its next step would change the sum of squares by next to nothing of what the fit leaves of a
     reading.
     """
@@ -376,7 +387,11 @@ def refine_optima(fits: LocalFits, found: Minima, trace: IntArray) -> Minima:
 
     low, high = fits.low[trace], fits.high[trace]
     closer = minimize(convex, found.x, low, high, _CLOSE, None, _DAMPING, _MOST_STEPS)
+    model = fits.problems[0].residuals.model
     evaluations = closer.evaluations * (1 + 2 * found.x.shape[1])
+    if not to_last_digits:
+        x = np.take_along_axis(closer.x, model.in_order(np.exp(closer.x)), axis=1)
+        return Minima(x, closer.misfit, evaluations, closer.converged)
     here, moving = fits.on_all_samples(found.x, trace), np.arange(len(found.x))
     residuals = [fits.problems[own].residuals for own in trace.tolist()]
     sizes = [(each.trace.scatter, each.peak, each.samples) for each in residuals]
@@ -412,8 +427,7 @@ def refine_optima(fits: LocalFits, found: Minima, trace: IntArray) -> Minima:
         damping[moving] = np.where(kept, less, np.maximum(more, _LITTLE))
         # A converged fit whose short step is rejected, too, is off its optimum by rounding only.
         moving = moving[kept | ~converged[moving] | (damping[moving] < _SHORT)]
-    order = fits.problems[0].residuals.model.in_order(np.exp(state.x))
-    x = np.take_along_axis(state.x, order, axis=1)
+    x = np.take_along_axis(state.x, model.in_order(np.exp(state.x)), axis=1)
     converged = left <= np.maximum(_UNTOLD * left_of_one, rounding)
     return Minima(x, state.here.misfit, evaluations, converged)
 

@@ -118,7 +118,8 @@ def fit_models(
         found[name] = {}
         if which:
             posed, random = [problems[name][it] for it in which], [rngs[name][it] for it in which]
-            fits = deepen(posed, identify_many(posed, own, random, silent, further))
+            given = posed, own, random, silent, further
+            fits = deepen(posed, identify_many(*given, to_last_digits=False))
             found[name] = dict(zip(which, fits, strict=True))
         done()
     _fit_again(problems, found)

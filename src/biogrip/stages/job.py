@@ -18,6 +18,7 @@ from typing import Any, ClassVar, get_type_hints
 
 from biogrip.errors import BiogripError
 from biogrip.keys import built
+from biogrip.processes import collect_less
 from biogrip.records.rows import seeds_of
 from biogrip.study.case_blocks import CaseBlock, Identifiability
 from biogrip.study.config import StudyConfig
@@ -139,6 +140,7 @@ def batch_names(seeds: int, size: int) -> list[str]:
 @contextmanager
 def logged(job: Any) -> Iterator[None]:
     """Write what is said to the job's log; an error of ours ends it with its message alone."""
+    collect_less()
     with Path(job.log[0]).open("w", encoding="utf-8") as stream, redirect_stderr(stream):
         try:
             yield
