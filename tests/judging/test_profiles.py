@@ -11,8 +11,8 @@ from biogrip.fit.least_squares import FINE
 from biogrip.fit.levenberg_marquardt import Normal
 from biogrip.fit.trace_fit import TraceFit
 from biogrip.judging.constrained_fits import ConstrainedFits, QuantityConstraint
-from biogrip.judging.diagnosis import RING, diagnose
-from biogrip.judging.doubts import DOUBT, Note
+from biogrip.judging.diagnosis import diagnose
+from biogrip.judging.doubts import DOUBT, RING, Note
 from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.onset import _at, profile_over_onset
 from biogrip.judging.profiles import (
@@ -174,10 +174,12 @@ def test_a_fitted_onset_leaves_the_limits_that_every_onset_has() -> None:
     exact = simulate(experiment, {"k_p": 6.0, "c_p": 30.0}, times)
     trace = exact + 9e-6 * np.random.default_rng(1).standard_normal(len(times))
     alone = diagnosis_of(experiment.of(times, trace), experiment.model)
-    notes = [Note(DOUBT, "Something else."), Note(DOUBT, f"{RING}: what inertia does.")]
-    merged, ends = profile_over_onset(replace(alone, notes=notes), times)
+    notes = [Note(DOUBT, "Something else."), Note(DOUBT, "Arms ring.", RING)]
+    merged = profile_over_onset(replace(alone, notes=notes), times)
     # Of milliseconds after a step nothing is told where it is known to tenths of a second.
-    assert (merged.notes, ends[0] < -0.05, ends[1] > 0.05) == (notes[:1], True, True)
+    assert merged.notes == notes[:1]
+    assert merged.onset_limits_s
+    assert merged.onset_limits_s[0] < -0.05 < 0.05 < merged.onset_limits_s[1]
     # What a later onset costs is taken off the threshold, and off what a limit takes.
     later, best = _at(alone.likelihood, 0.2), alone.likelihood
     cost = best.increase(later.misfit)

@@ -52,7 +52,7 @@ def judged_data(diagnosis: Diagnosis) -> dict[str, Any]:
             for trade in ([] if rejected else diagnosis.trades)
         ],
         **({"jaw_force": dict(vars(diagnosis.grip))} if diagnosis.grip else {}),
-        "notes": [dict(vars(note)) for note in ordered],
+        "notes": [{"weight": note.weight, "text": note.text} for note in ordered],
     }
 
 

@@ -88,11 +88,10 @@ def identify_alike(
     if not first.simulated:
         doing("trying other sample models")
         judged = _compared(traces, fits, judged, valley=valley)
-    onsets_s: list[tuple[float, float] | None] = [None] * len(traces)
     for index, (recording, experiment) in enumerate(traces):
         if experiment.fit_start:
-            judged[index], onsets_s[index] = profile_over_onset(judged[index], recording.time_s)
-    if not experiments[0].instrument.sweeps:
+            judged[index] = profile_over_onset(judged[index], recording.time_s)
+    if not first.instrument.sweeps:
         doing("trying an offset and a drift")
     notes = [_notes_on_fit(*pair) for pair in zip(fits, experiments, strict=True)]
     if not first.simulated:
@@ -104,7 +103,6 @@ def identify_alike(
             recording=recording,
             experiment=experiment,
             fit=fits[index],
-            onset_limits_s=onsets_s[index],
         )
         for index, (recording, experiment) in enumerate(traces)
     ]
@@ -142,8 +140,8 @@ def _notes_on_traces(
         given = recording.time_s, recording.readings, judged[index]
         start = notes_on_start(experiment, *given)
         said += start
-        doubts = [note.text for note in judged[index].notes if note.weight == DOUBT]
-        rounded = any(text.startswith(ROUNDED) for text in doubts)
+        own = judged[index].notes
+        rounded = any(note.about == ROUNDED and note.weight == DOUBT for note in own)
         # Beside another start, or errors of rounding, an offset and a drift mean nothing.
         if not rounded and all(note.weight == HARMLESS for note in start):
             said += opinions[index]

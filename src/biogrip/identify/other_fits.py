@@ -9,7 +9,7 @@ ratio: if neither is in the trace, the decrease of chi^2 follows a chi-squared d
 many degrees of freedom as terms are added (Wilks 1938).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -124,12 +124,10 @@ _Own = tuple[Trace, TraceFit, Diagnosis]
 def _one_branch_more(own: _Own, models: FittedModels) -> str | None:
     """Return the model with one branch more than the best one, if it was not tried and may be."""
     (_, experiment), fit, _ = own
-    if not experiment.usual_models:
-        return None
     name = one_branch_more(models.tried, adequate=models.adequate)
-    if name in models.spared:
+    if not experiment.usual_models or name is None or name in models.spared:
         return None
-    return name if name and len(CANDIDATES[name].model.names) <= _most(experiment, fit) else None
+    return name if len(CANDIDATES[name].model.names) <= _most(experiment, fit) else None
 
 
 def _tried(own: Sequence[_Own], names: Sequence[str]) -> list[FittedModels]:
@@ -357,8 +355,11 @@ def _better(
     """Return fits with an offset, or a drift, too, by index, if they are better."""
     if not which:
         return {}
-    also = [_with_terms(*traces[index], drift=drift) for index in which]
-    found = {}
+    also, found = [], {}
+    for recording, experiment in (traces[index] for index in which):
+        # As if the user had declared them.
+        declared = replace(experiment, offset=True, drift=drift or experiment.drift)
+        also.append((recording, for_trace(declared, recording)))
     for index, own, fit in zip(which, also, fits_of(also, silent), strict=True):
         experiment, likelihood = traces[index][1], diagnoses[index].likelihood
         fall = compute_fall(
@@ -371,12 +372,6 @@ def _better(
         if (chance := float(chdtrc(added, max(fall, 0.0)))) < FALSE_ALARM:
             found[index] = _Other(own, fit, fall, chance, added)
     return found
-
-
-def _with_terms(recording: Recording, experiment: Experiment, *, drift: bool) -> Trace:
-    """Return a trace as if the user had declared an offset, or a drift, too."""
-    experiment = replace(experiment, offset=True, drift=drift or experiment.drift)
-    return recording, for_trace(experiment, recording)
 
 
 def _note(trace: Trace, diagnosis: Diagnosis, other: _Other, judged: Diagnosis) -> Note:
@@ -425,42 +420,40 @@ def _note(trace: Trace, diagnosis: Diagnosis, other: _Other, judged: Diagnosis) 
     return Note(REJECTION if rejected else weight, text)
 
 
-def note_flow(recording: Recording, experiment: Experiment) -> list[Note]:
+def note_flow(recording: Recording, experiment: Experiment) -> Iterator[Note]:
     """Say of a damper that lets the sample flow that a drift would look the same."""
     damper = flow_of(experiment)
-    if not damper or not drift_is_flow(experiment.torque, recording.time_s):
-        return []
-    held = f"{damper} holds if the instrument does not drift"
-    if experiment.drift:
-        held = f"of {damper} and the drift that is fitted along, only the sum is determined"
-    text = (
-        f"Under a constant {experiment.instrument.controlled.name} a drift of the instrument and "
-        f"the flow of the sample are one line: {held}."
-    )
-    return [Note(HARMLESS, text)]
+    if damper and drift_is_flow(experiment.torque, recording.time_s):
+        held = f"{damper} holds if the instrument does not drift"
+        if experiment.drift:
+            held = f"of {damper} and the drift that is fitted along, only the sum is determined"
+        yield Note(
+            HARMLESS,
+            f"Under a constant {experiment.instrument.controlled.name} a drift of the instrument "
+            f"and the flow of the sample are one line: {held}.",
+        )
 
 
-def note_saturated(recording: Recording, experiment: Experiment) -> list[Note]:
-    """Return a doubt if many readings after the start are exactly the largest, or the smallest.
+def note_saturated(recording: Recording, experiment: Experiment) -> Iterator[Note]:
+    """Yield a doubt if many readings after the start are exactly the largest, or the smallest.
 
     Readings that are only rounded have neighbouring values nearly as often.
     """
     values, counts = np.unique(recording.readings[recording.time_s > 0], return_counts=True)
-    unit, notes = f" {experiment.instrument.read.unit}".rstrip(), []
+    if len(values) < FEWEST_VALUES:
+        return
+    unit, least = f" {experiment.instrument.read.unit}".rstrip(), SATURATED * np.sum(counts)
     for end, at, near in (
-        ("largest", -1, slice(-FEWEST_VALUES, -1)),
-        ("smallest", 0, slice(1, FEWEST_VALUES)),
+        ("largest", -1, counts[-FEWEST_VALUES:-1]),
+        ("smallest", 0, counts[1:FEWEST_VALUES]),
     ):
-        if len(values) < FEWEST_VALUES or counts[at] <= SATURATED * np.sum(counts):
-            continue
-        if counts[at] > MORE_OFTEN * np.max(counts[near]):
-            text = (
+        if counts[at] > max(least, MORE_OFTEN * np.max(near)):
+            yield Note(
+                DOUBT,
                 f"{counts[at]} of {np.sum(counts)} readings are exactly the {end}, "
                 f"{plain(values[at])}{unit}: the instrument looks saturated, and what it cut off "
-                "is missing."
+                "is missing.",
             )
-            notes.append(Note(DOUBT, text))
-    return notes
 
 
 def _differ(before: Finding, after: Finding) -> bool:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from operator import itemgetter
 
 import numpy as np
-from scipy.special import ndtri
+from scipy.special import fdtri, ndtri
 
 from biogrip.arrays import Array
 from biogrip.digits import plain
@@ -146,8 +146,6 @@ def _either_sign(trace: Array, responses: Array, nuisance: Array) -> list[tuple[
 
 def _responds(trace: Array, nuisance: Array, rest: float, unknowns: int, freedom: int) -> bool:
     """Return True if responses explain more than they would of white noise, by an F test."""
-    from scipy.special import fdtri
-
     explained = float(np.sum(without(nuisance, trace) ** 2)) - rest
     return bool(explained > unknowns * fdtri(unknowns, freedom, 1 - NO_RESPONSE) * rest / freedom)
 

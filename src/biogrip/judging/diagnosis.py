@@ -30,6 +30,7 @@ from biogrip.judging.doubts import (
     HARMLESS,
     REJECTED,
     REJECTION,
+    RING,
     ROUNDED,
     Note,
     Remainder,
@@ -49,9 +50,6 @@ from biogrip.traces.reader import Recording
 
 # Widening of a range, and the start beyond its end, in e-folds; and rounding.
 _WIDER, _BEYOND, _AT_END = np.log(1e3), 1.0, 1e-9
-
-RING = "The arms ring"
-"""Beginning of the note on ringing."""
 
 
 @dataclass(frozen=True)
@@ -257,7 +255,7 @@ def _with_notes(judged: Diagnosis, of_rest: list[Note], model: SampleModel) -> D
     ]
     notes += [*_range_ends(likelihood, model), *of_rest]
     # Limits that allow for rounding hold, however wide they are.
-    if not any(note.text.startswith(ROUNDED) for note in of_rest):
+    if not any(note.about == ROUNDED for note in of_rest):
         notes += _too_slow(judged)
     notes += _pulling(grip, residuals.duration_s)
     if not judged.converged:
@@ -318,9 +316,10 @@ def _ringing(judged: Diagnosis, *, rejected: bool) -> Iterator[Note]:
     if ring := residuals.ring(network, noise_sd):
         yield Note(
             REJECTION if rejected else DOUBT,
-            f"{RING}: their inertia, which fits leave out, changes readings of this sample "
+            "The arms ring: their inertia, which fits leave out, changes readings of this sample "
             f"by up to {plain(ring.largest, 2)} times the noise. Leave out the readings of the "
             f"first {_rounded_up(1e3 * ring.lasts_s)} ms after each change of the torque.",
+            RING,
         )
 
 

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 
 import numpy as np
+from scipy.special import chdtr, chdtrc
 
 from biogrip.arrays import Array, BoolArray
 from biogrip.digits import counted, p_value, plain
@@ -54,8 +55,8 @@ HARMLESS, DOUBT, REJECTION = "harmless", "doubt", "rejection"
 OK, DOUBTFUL, REJECTED = "ok", "doubtful", "rejected"
 """Status of a fit by the heaviest of its notes."""
 
-ROUNDED = "The readings are rounded"
-"""Beginning of the note on errors of rounding."""
+ROUNDED, RING = "rounded", "ring"
+"""What notes are about that others depend on."""
 
 _STATUS = {HARMLESS: OK, DOUBT: DOUBTFUL, REJECTION: REJECTED}
 _WEIGHTS = tuple(_STATUS)
@@ -69,6 +70,8 @@ class Note:
     """`HARMLESS`: the results hold. `DOUBT`: they may not. `REJECTION`: they do not."""
     text: str
     """The sentence."""
+    about: str = ""
+    """`ROUNDED` or `RING`, if it is about that."""
 
 
 def compute_status(notes: Sequence[Note]) -> str:
@@ -132,11 +135,31 @@ class _Left:
 
     @cached_property
     def lines(self) -> list[str]:
-        """Sentences on lines in the spectrum; outliers have all frequencies, and sweeps none."""
+        """Sentence on lines in the spectrum, if there is no other misfit.
+
+        Outliers have all frequencies, and sweeps none.
+        """
         residuals = self.likelihood.problem.residuals
         if residuals.course.sweeps or self.struck.any():
             return []
-        return list(_lines(self.bulk, self.basis, residuals, self.scale))
+        rest, taken, named = self.bulk, self.basis, list[str]()
+        unit, slowest = f" {residuals.instrument.read.unit}".rstrip(), np.inf
+        while len(named) < _MOST_LINES:
+            frequency, chance, line = find_line(rest, residuals.trace.time_s)
+            if chance >= levels.FALSE_ALARM:
+                break
+            amplitude = float(np.linalg.norm(line @ rest)) * np.sqrt(2 / len(rest))
+            named.append(f"{plain(frequency, 3)} Hz ({plain(amplitude, 2)}{unit})")
+            slowest = min(slowest, frequency)
+            taken = absorbed(np.vstack((taken, line)))
+            rest = without(taken, self.bulk)
+        large = float(np.sqrt(np.mean(rest**2))) > levels.TOO_MUCH * self.scale
+        if not named or (large and correlated(rest, taken)[1] < levels.CERTAIN_MISFIT):
+            return []
+        return [
+            f"The residual has a line in its spectrum, at {' and '.join(named)}, as of hum or a "
+            f"vibration. Filter it out, or average the readings over {plain(1 / slowest, 3)} s."
+        ]
 
 
 def examine_residuals(likelihood: Likelihood) -> Remainder:
@@ -226,11 +249,11 @@ def _find_notes_of_rounding(left: _Left, misfit: Note | None = None) -> list[Not
     residuals = left.likelihood.problem.residuals
     size = f"{plain(residuals.trace.rounding, 2)} {residuals.instrument.read.unit}".rstrip()
     text = (
-        f"{ROUNDED} to steps of {size}, more than their noise, or are cut off there. The limits "
-        "allow for one error wherever a reading is the same."
+        f"The readings are rounded to steps of {size}, more than their noise, or are cut off "
+        "there. The limits allow for one error wherever a reading is the same."
     )
     status = compute_status(_find_notes(left, misfit))
-    return [Note(HARMLESS if status == OK else DOUBT, text)]
+    return [Note(HARMLESS if status == OK else DOUBT, text, ROUNDED)]
 
 
 def _misfit(left: _Left, residual: Array, slopes: Array) -> tuple[Note, tuple[float, float] | None]:
@@ -336,28 +359,6 @@ def _about_colour(left: _Left) -> Iterator[str]:
         )
 
 
-def _lines(residual: Array, basis: Array, residuals: Residuals, scale: float) -> Iterator[str]:
-    """Yield a sentence on lines in the spectrum of residuals, if these have no other misfit."""
-    rest, taken, named = residual, basis, list[str]()
-    unit, slowest = f" {residuals.instrument.read.unit}".rstrip(), np.inf
-    while len(named) < _MOST_LINES:
-        frequency, chance, line = find_line(rest, residuals.trace.time_s)
-        if chance >= levels.FALSE_ALARM:
-            break
-        amplitude = float(np.linalg.norm(line @ rest)) * np.sqrt(2 / len(rest))
-        named.append(f"{plain(frequency, 3)} Hz ({plain(amplitude, 2)}{unit})")
-        slowest = min(slowest, frequency)
-        taken = absorbed(np.vstack((taken, line)))
-        rest = without(taken, residual)
-    size = float(np.sqrt(np.mean(rest**2)))
-    misfit = correlated(rest, taken)[1] < levels.CERTAIN_MISFIT and size > levels.TOO_MUCH * scale
-    if named and not misfit:
-        yield (
-            f"The residual has a line in its spectrum, at {' and '.join(named)}, as of hum or a "
-            f"vibration. Filter it out, or average the readings over {plain(1 / slowest, 3)} s."
-        )
-
-
 def _about_changes(left: _Left, *, coloured: bool) -> list[str]:
     """Return a sentence on a change within the trace, if it explains what its fit leaves."""
     residuals, residual, basis = left.likelihood.problem.residuals, left.bulk, left.basis
@@ -422,8 +423,6 @@ def _about_outliers(residuals: Residuals, struck: BoolArray) -> Iterator[str]:
 
 def _about_given(likelihood: Likelihood, residual: Array) -> Iterator[Note]:
     """Yield a note if the noise that was given is refuted by residuals, in a chi-squared test."""
-    from scipy.special import chdtr, chdtrc
-
     if likelihood.freedom < np.inf:
         return
     residuals = likelihood.problem.residuals
