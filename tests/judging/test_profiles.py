@@ -145,8 +145,8 @@ def test_the_search_range_determines_no_combination() -> None:
     """
     times = np.linspace(0.0, 400.0, 801)
     noise = 4e-6 * np.random.default_rng(1).standard_normal(len(times))
-    problem = posed_for(MODEL, times, rotation(MODEL, SOFT, times) + noise)
-    judged = diagnosis_of(problem, MODEL, noise_sd=1e-4)
+    problem = posed_for(MODEL, times, rotation(MODEL, SOFT, times) + noise, noise_sd=1e-4)
+    judged = diagnosis_of(problem)
     series = next(q for q in find_combinations(MODEL, [0, 1]) if q.sense < 0)
     # To first order it is known well enough to be looked at.
     assert judged.likelihood.deviation(series) < 0.5
@@ -173,7 +173,7 @@ def test_a_fitted_onset_leaves_the_limits_that_every_onset_has() -> None:
     times = np.arange(61.0)
     exact = simulate(experiment, {"k_p": 6.0, "c_p": 30.0}, times)
     trace = exact + 9e-6 * np.random.default_rng(1).standard_normal(len(times))
-    alone = diagnosis_of(experiment.of(times, trace), experiment.model)
+    alone = diagnosis_of(experiment.of(times, trace))
     notes = [Note(DOUBT, "Something else."), Note(DOUBT, "Arms ring.", RING)]
     merged = profile_over_onset(replace(alone, notes=notes), times)
     # Of milliseconds after a step nothing is told where it is known to tenths of a second.
@@ -229,7 +229,7 @@ def test_an_optimum_that_was_missed_is_judged_again() -> None:
     elsewhere = found.parameters * np.array([1.1, 1.02])
     misfit = float(experiment.residuals.misfit(elsewhere[None])[0])
     missed = replace(found, parameters=elsewhere, misfit=misfit)
-    right, again = (diagnose(experiment, maxwell, f, confidence=0.95) for f in (found, missed))
+    right, again = (diagnose(experiment, f, confidence=0.95) for f in (found, missed))
     assert again.likelihood.misfit == pytest.approx(right.likelihood.misfit, rel=1e-9)
     # Coverage is tested with limits of the same fit.
     fit = TraceFit(experiment, missed, None, np.zeros(len(times), bool))
@@ -289,7 +289,7 @@ def test_a_sum_whose_condition_the_best_fit_breaks_is_not_stated(k_p: float, sta
     """A branch of 4 s beside a spring that is declared to be none: the branch takes its part."""
     times, model = clean("liquid_drop_1")[0], with_fixed(MODEL, {"k_p": k_p})
     noise = 3e-6 * np.random.default_rng(0).standard_normal(len(times))
-    judged = diagnosis_of(posed_for(model, times, rotation(MODEL, SOFT, times) + noise), model)
+    judged = diagnosis_of(posed_for(model, times, rotation(MODEL, SOFT, times) + noise))
     total = next(each for each in judged.findings if each.quantity.label == "c + c_p")
     assert (total.verdict == DETERMINED) == stated
     assert ("a branch of the best fit relaxes in" in total.words()) != stated

@@ -38,6 +38,7 @@ from biogrip.fit.noise_model_fit import absorbed, compare_extremes, compute_grow
 from biogrip.fit.problem import Fit, Progress, TraceProblem, silent
 from biogrip.fit.trace_fit import TraceFit, fit_least_squares
 from biogrip.identify.prepare import flow_of, for_trace
+from biogrip.judging import levels
 from biogrip.judging.diagnosis import Diagnosis, diagnose
 from biogrip.judging.doubts import (
     DOUBT,
@@ -47,15 +48,6 @@ from biogrip.judging.doubts import (
     Note,
     compute_status,
     examine_residuals,
-)
-from biogrip.judging.levels import (
-    CLEARLY,
-    FALSE_ALARM,
-    FAR_BETTER,
-    FEWEST_VALUES,
-    MISSED,
-    MORE_OFTEN,
-    SATURATED,
 )
 from biogrip.judging.likelihood import compute_fall, make_likelihood
 from biogrip.judging.onset import OnsetFits
@@ -85,17 +77,6 @@ def fits_of(traces: Sequence[Trace], progress: Progress) -> list[TraceFit]:
     rngs = [experiment.stream("identifiability") for experiment in experiments]
     posed = [(recording.time_s, recording.readings) for recording, _ in traces]
     return fit_least_squares(experiments, posed, rngs, progress)
-
-
-def _diagnosed(experiment: Experiment, fit: TraceFit, found: Fit, *, valley: bool) -> Diagnosis:
-    return diagnose(
-        fit.problem,
-        experiment.searched,
-        found,
-        confidence=experiment.confidence,
-        noise_sd=experiment.noise_sd,
-        valley=valley,
-    )
 
 
 def models_tried(
@@ -206,7 +187,8 @@ def _leaves_noise(experiment: Experiment, problem: TraceProblem, answer: Fit) ->
         confidence=experiment.confidence,
         noise_sd=experiment.noise_sd,
     )
-    return compute_status(examine_residuals(likelihood).find_notes()) != REJECTED
+    _, find_notes = examine_residuals(likelihood)
+    return compute_status(find_notes()) != REJECTED
 
 
 def _growth(diagnosis: Diagnosis) -> Array | None:
@@ -220,7 +202,7 @@ def _growth(diagnosis: Diagnosis) -> Array | None:
     growth = compute_growth(
         residuals.left(best), residuals.response(best), residuals.trace.rounding
     )
-    return growth if compare_extremes(growth) > CLEARLY else None
+    return growth if compare_extremes(growth) > levels.CLEARLY else None
 
 
 def _misfits(
@@ -281,12 +263,7 @@ def _most(experiment: Experiment, fit: TraceFit) -> int:
 
 
 def judge_again(
-    experiment: Experiment,
-    fit: TraceFit,
-    diagnosis: Diagnosis,
-    models: FittedModels,
-    *,
-    valley: bool,
+    fit: TraceFit, diagnosis: Diagnosis, models: FittedModels, *, valley: bool
 ) -> Diagnosis:
     """Diagnose a trace again if its own model was fitted better, within the search range, since.
 
@@ -294,10 +271,11 @@ def judge_again(
     range.
     """
     own = models.answers.get(models.chosen)
-    if own is None or (increase := diagnosis.likelihood.increase(own.misfit)) > -MISSED:
+    if own is None or (increase := diagnosis.likelihood.increase(own.misfit)) > -levels.MISSED:
         return diagnosis
     if is_within(own.parameters, fit.problem):
-        return _diagnosed(experiment, fit, own, valley=valley)
+        confidence = diagnosis.likelihood.confidence
+        return diagnose(fit.problem, own, confidence=confidence, valley=valley)
     gone = vanished(models.chosen, own)
     where = f", without {' and '.join(gone)}" if gone else ""
     text = (
@@ -328,12 +306,13 @@ def second_opinions(traces: Sequence[Trace], diagnoses: Sequence[Diagnosis]) -> 
     offsets = _better(traces, diagnoses, alone, drift=False)
     for index, other in both.items():
         one = offsets.get(index)
-        if one and chdtrc(1, max(other.fall - one.fall, 0.0)) >= FALSE_ALARM:
+        if one and chdtrc(1, max(other.fall - one.fall, 0.0)) >= levels.FALSE_ALARM:
             other = one
-        judged = _diagnosed(other.trace[1], other.fit, other.fit.found, valley=False)
+        confidence = diagnoses[index].likelihood.confidence
+        judged = diagnose(other.fit.problem, other.fit.found, confidence=confidence)
         terms = np.log(len(traces[index][0].time_s)) * other.added
         models = diagnoses[index].models
-        led = models is not None and models.lead > other.fall - terms + FAR_BETTER
+        led = models is not None and models.lead > other.fall - terms + levels.FAR_BETTER
         if not (led or diagnoses[index].status == judged.status == REJECTED):
             notes[index].append(_note(traces[index], diagnoses[index], other, judged))
     return notes
@@ -369,7 +348,7 @@ def _better(
             likelihood.noise_sd if experiment.noise_sd is not None else None,
         )
         added = own[1].offset_and_drift - experiment.offset_and_drift
-        if (chance := float(chdtrc(added, max(fall, 0.0)))) < FALSE_ALARM:
+        if (chance := float(chdtrc(added, max(fall, 0.0)))) < levels.FALSE_ALARM:
             found[index] = _Other(own, fit, fall, chance, added)
     return found
 
@@ -440,14 +419,14 @@ def note_saturated(recording: Recording, experiment: Experiment) -> Iterator[Not
     Readings that are only rounded have neighbouring values nearly as often.
     """
     values, counts = np.unique(recording.readings[recording.time_s > 0], return_counts=True)
-    if len(values) < FEWEST_VALUES:
+    if len(values) < levels.FEWEST_VALUES:
         return
-    unit, least = f" {experiment.instrument.read.unit}".rstrip(), SATURATED * np.sum(counts)
+    unit, least = f" {experiment.instrument.read.unit}".rstrip(), levels.SATURATED * np.sum(counts)
     for end, at, near in (
-        ("largest", -1, counts[-FEWEST_VALUES:-1]),
-        ("smallest", 0, counts[1:FEWEST_VALUES]),
+        ("largest", -1, counts[-levels.FEWEST_VALUES : -1]),
+        ("smallest", 0, counts[1 : levels.FEWEST_VALUES]),
     ):
-        if counts[at] > max(least, MORE_OFTEN * np.max(near)):
+        if counts[at] > max(least, levels.MORE_OFTEN * np.max(near)):
             yield Note(
                 DOUBT,
                 f"{counts[at]} of {np.sum(counts)} readings are exactly the {end}, "

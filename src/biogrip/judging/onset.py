@@ -492,15 +492,15 @@ def _longest_ramp(
         return None
     earlier_s = _EARLIER * spacing_at(fits.time_s, 0.0)
     earlier = fits.at(-earlier_s, given.log_parameters).log_parameters
-    lengths = {}
+    lengths = []
     for each in diagnosis.findings:
         if each.low and each.high:
             value, moved = (each.quantity.log(x) for x in (given.log_parameters, earlier))
             room = min(abs(np.log(end) - value) for end in (each.low, each.high))
-            lengths[each.quantity.label] = 2 * earlier_s * room / max(abs(moved - value), 1e-12)
-    label = min(lengths, key=lambda label: lengths[label], default="")
-    short = label and lengths[label] < levels.SHORT_RAMP * fits.time_s[-1]
-    return (lengths[label], label) if short else None
+            length_s = 2 * earlier_s * room / max(abs(moved - value), 1e-12)
+            lengths.append((length_s, each.quantity.label))
+    shortest = min(lengths, default=(np.inf, ""))
+    return shortest if shortest[0] < levels.SHORT_RAMP * fits.time_s[-1] else None
 
 
 def _with_ramp(experiment: Experiment, time_s: Array) -> Experiment | None:

@@ -28,11 +28,10 @@ import numpy as np
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.digits import round_increase, rounded
 from biogrip.fit.least_squares import FAIR, FINE, alike
+from biogrip.judging import levels
 from biogrip.judging.constrained_fits import CLOSE, ConstrainedFits
-from biogrip.judging.levels import MISSED
 from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.quantities import Quantity
-from biogrip.physics.sample_model import SampleModel
 
 HIGHEST = 16.0
 """Increase of chi^2 up to which a profile has dense points, as figures show no more."""
@@ -347,9 +346,7 @@ _FIRSTS = np.concatenate((np.arange(0.002, 0.1, 0.005), np.linspace(0.11, 1.2, 1
 _SECONDS = np.concatenate((np.arange(0.9, 1.06, 0.005), [1.08, 1.12, 1.2]))
 
 
-def compute_valley(
-    likelihood: Likelihood, model: SampleModel
-) -> tuple[dict[str, Any] | None, Array | None]:
+def compute_valley(likelihood: Likelihood) -> tuple[dict[str, Any] | None, Array | None]:
     """Compute the increase of chi^2 over two exchangeable parameters, with the others fitted.
 
     The first returned has ``x`` and ``y``, names and units; ``best``; and ``grids``, along the
@@ -357,6 +354,7 @@ def compute_valley(
     ``increases``. It is None unless just two, among others, were searched. The second is a missed
     optimum, or None.
     """
+    model = likelihood.problem.residuals.model
     pair = [index for index, p in enumerate(model.parameters) if p.name in model.exchangeable]
     if len(pair) != 2 or len(model.parameters) == 2:
         return None, None
@@ -405,5 +403,5 @@ def _increases(
         start[:, pair] = x[points][:, pair]
         tolerance = CLOSE
     lowest = int(np.argmin(increases))
-    missed = x[lowest] if increases[lowest] < -MISSED else None
+    missed = x[lowest] if increases[lowest] < -levels.MISSED else None
     return increases.reshape(rows, columns), missed
