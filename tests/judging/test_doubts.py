@@ -8,7 +8,6 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import chi2
 
-from biogrip.arrays import Array
 from biogrip.judging.doubts import (
     DOUBT,
     DOUBTFUL,
@@ -129,24 +128,17 @@ def test_noise_that_grows_has_a_share_of_what_is_read() -> None:
     assert said.endswith("weighted by --noise-share 0.02.")
 
 
-def left_by(noise: str) -> Array:
-    """Four hundred residuals: of fast noise, with a burst of it, or of a smooth misfit."""
+def test_fast_noise_is_neither_smooth_nor_in_one_place() -> None:
+    """Neighbours of a smooth misfit differ by 1, and all of it scatters by 14."""
     time_s, rng = np.arange(400.0), np.random.default_rng(0)
-    if noise == "smooth":
-        return 20 * np.sin(2 * np.pi * time_s / 10) + rng.standard_normal(400)
-    fast = lfilter([1.0], [1.0, -0.6], rng.standard_normal(500))[100:]
-    if noise == "burst":
-        # Then 45 % of all squares are those of a twentieth.
-        fast[:20] *= np.sqrt(0.45 / 0.55 * np.sum(fast[20:] ** 2) / np.sum(fast[:20] ** 2))
-    return fast
-
-
-@pytest.mark.parametrize(("noise", "fast"), [("fast", True), ("burst", False), ("smooth", False)])
-def test_fast_noise_is_neither_smooth_nor_in_one_place(noise: str, fast: bool) -> None:
-    """Neighbours of the smooth misfit differ by 1, and all of it scatters by 14."""
-    time_s = np.arange(400.0)
     residuals = seen(trace=seen(time_s=time_s), coloured=False, duration_s=399.0, noise_scale=1.0)
-    assert has_fast_noise(residuals, left_by(noise), np.ones((1, 400))) == fast
+    fast = lfilter([1.0], [1.0, -0.6], rng.standard_normal(500))[100:]
+    # Of a burst are 45 % of all squares, in a twentieth of the readings.
+    most = np.sqrt(0.45 / 0.55 * np.sum(fast[20:] ** 2) / np.sum(fast[:20] ** 2))
+    burst = fast * np.where(time_s < 20, most, 1.0)
+    smooth = 20 * np.sin(2 * np.pi * time_s / 10) + rng.standard_normal(400)
+    found = [has_fast_noise(residuals, it, np.ones((1, 400))) for it in (fast, burst, smooth)]
+    assert found == [True, False, False]
 
 
 def test_share_and_time_less_its_error_decide() -> None:
