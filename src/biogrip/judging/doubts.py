@@ -282,7 +282,7 @@ def name_suspects(residuals: Residuals, times: float, scale: float) -> str:
     gives, culprits = "gives this trace under this protocol", "load, clock, contact or drift"
     if residuals.course.sweeps:
         gives = "has both moduli (Kramers-Kronig)"
-        culprits = whiteness.find_inertia(residuals, *left)
+        _, culprits = whiteness.find_inertia(residuals, *left)
     noises = counted(least, "noise")
     inadequate = f"the model is not adequate, as a linear sample of another kind fits to {noises}"
     if whiteness.correlated(*left)[1] >= levels.FALSE_ALARM:
@@ -344,9 +344,7 @@ def _about_changes(left: _Left, *, coloured: bool) -> list[str]:
     trace, growth = residuals.trace, left.growth
     if residuals.course.sweeps:
         return [] if coloured else list(whiteness.about_moduli(residuals, residual, basis, growth))
-    cleared = trace.condensed.cleared
-    weighted = (lambda rows: cleared(rows) / growth) if np.ptp(growth) else cleared
-    step = whiteness.find_step(residual, basis, weighted)
+    step = whiteness.find_step(residual, basis, lambda it: trace.condensed.cleared(it) / growth)
     if step and step.chance < levels.FALSE_ALARM and not (coloured and _is_coloured(step)):
         before_s, after_s = trace.time_s[step.before - 1 : step.before + 1]
         size = plain(-step.size, 2)

@@ -397,8 +397,8 @@ def compare_halves(residual: Array, basis: Array, split: int) -> float:
 
 def find_inertia(
     residuals: Residuals, residual: Array, basis: Array, growth: Array | float = 1.0
-) -> str:
-    """Return in words what may make moduli wrong: inertia, if an F test tells it, or what else."""
+) -> tuple[bool, str]:
+    """Return True if an F test tells inertia, and in words what may make moduli wrong."""
     places, free = residuals.trace.time_s, len(residual) - len(basis)
     squared = np.where(is_storage(places), places**2, 0.0)
     shape = without(basis, residuals.trace.condensed.cleared(squared) / growth)
@@ -406,9 +406,10 @@ def find_inertia(
     size = float(shape @ residual) / square
     explained = size**2 * square
     if fdtrc(1, free - 1, explained * (free - 1) / (total - explained)) >= levels.FALSE_ALARM:
-        return "a column of something else, slip, too large a strain, or a sample that changed"
+        what = "a column of something else, slip, too large a strain, or a sample that changed"
+        return False, what
     part = plain(100 * abs(size) * float(places[-1]) ** 2 / float(residuals.trace.readings[-1]), 2)
-    return (
+    return True, (
         "inertia of the instrument or the sample, as the storage modulus has a part that goes with "
         f"the frequency squared, {part} % at the highest: correct for it, or leave the highest "
         "frequencies out (--until)"
@@ -424,8 +425,8 @@ def about_moduli(
     scatters more than the other for its weights, by an F test.
     """
     storage = is_storage(residuals.trace.time_s)
-    cause = find_inertia(residuals, residual, basis, growth)
-    if cause.startswith("inertia"):
+    is_inertia, cause = find_inertia(residuals, residual, basis, growth)
+    if is_inertia:
         yield f"The fit leaves what is of {cause}."
     elif (chance := compare_halves(residual, basis, int(np.sum(~storage)))) < levels.FALSE_ALARM:
         yield (
