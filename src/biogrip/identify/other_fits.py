@@ -238,7 +238,7 @@ _SAME_NETWORK = "liquid_drop", "zener_maxwell"
 
 def _candidates(experiment: Experiment, fit: TraceFit) -> tuple[str, ...]:
     """Return the names of the models to fit to a trace, none if nothing is compared."""
-    if experiment.fixed or experiment.simulated:
+    if experiment.fixed:
         return ()
     residuals, chosen = fit.problem.residuals, experiment.sample.candidate
     # One network has one name: that asked for, or else that which is usual for the instrument.

@@ -174,11 +174,8 @@ def without_repeats(trace: Recording) -> Recording:
     at_ends = np.abs(changes[1:][~kept[1:-1] & kept[2:]])
     runs = np.diff(np.append(np.flatnonzero(kept), len(kept)))
     held = np.mean(~kept) > levels.REPEATED and np.max(runs) <= levels.ALIKE * np.median(runs)
-    if not (
-        held
-        and len(at_ends)
-        and np.median(at_ends) > levels.ONE_STEP * measure_rounding(trace.readings)
-    ):
+    step = levels.ONE_STEP * measure_rounding(trace.readings)
+    if not (held and len(at_ends) and np.median(at_ends) > step):
         return trace
     said = (
         "Left out, for they repeat the one before, as of a sensor that is read less often than it "
