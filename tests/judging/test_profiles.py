@@ -256,20 +256,17 @@ def test_a_held_fit_is_scipys(label: str) -> None:
         assert increase == pytest.approx(scipys, abs=0.02)
 
 
-def parabolas(values: Array) -> Array:
-    """Two basins about -2 and 2, whose square roots are straight."""
-    return np.minimum((values + 2) ** 2, (values - 2) ** 2)
-
-
 def test_a_set_in_two_parts_has_a_gap_that_its_verdict_names() -> None:
+    """Two basins about -2 and 2, whose square roots are straight."""
     values = np.linspace(-5, 5, 101)
-    (gap,) = find_gaps(values, parabolas(values), 1.0)
+    parabolas = np.minimum((values + 2) ** 2, (values - 2) ** 2)
+    (gap,) = find_gaps(values, parabolas, 1.0)
     assert gap == pytest.approx((-1.0, 1.0))
-    assert find_gaps(values, parabolas(values), 4.5) == ()
+    assert find_gaps(values, parabolas, 4.5) == ()
     # What is above the threshold by no more than fits are good to, a hundredth of it, is none.
-    assert find_gaps(values, np.minimum(parabolas(values), 1.005), 1.0) == ()
-    assert len(find_gaps(values, np.minimum(parabolas(values), 1.02), 1.0)) == 1
-    whole = Profile(values, parabolas(values), 2.0, -3.0, 3.0, np.zeros(4))
+    assert find_gaps(values, np.minimum(parabolas, 1.005), 1.0) == ()
+    assert len(find_gaps(values, np.minimum(parabolas, 1.02), 1.0)) == 1
+    whole = Profile(values, parabolas, 2.0, -3.0, 3.0, np.zeros(4))
     others: tuple[dict[str, Any], ...] = ({}, {"gaps": (gap,)}, {"high": None}, {"low": None})
     said = [Finding(QUANTITIES[0], replace(whole, **other), 0.1).words() for other in others]
     gapped = Finding(QUANTITIES[0], replace(whole, gaps=(gap,)), 0.1)
@@ -322,11 +319,6 @@ TWO_HALVES = np.where(MANY < 30, 2e-4, 8e-4)
 OFFSET, SD = {"offset": True}, {"sd": TWO_HALVES}
 
 
-def crept(t: Array, k_s: float, k_v: float, c_v: float) -> Array:
-    """The strain under 5 Pa of a spring and a Kelvin-Voigt element in series."""
-    return 5 / k_s + 5 / k_v * (1 - np.exp(-t * k_v / c_v))
-
-
 @pytest.mark.parametrize(
     ("times", "sd", "given", "limits"),
     [
@@ -341,12 +333,14 @@ def test_limits_are_lmfits(
 ) -> None:
     """To a relative 3e-5: the root search of lmfit 1.3.4 ends within some 1e-5.
 
+    Under 5 Pa a spring and a Kelvin-Voigt element in series yield.
     `conf_interval(fit, fit, p_names=["k_s", "k_v", "c_v"], sigmas=[0.95])` gave the numbers, where
     `fit` starts from `SOLID` with `min=1e-6`. Deviations are `weights` with `scale_covar=False` and
     `prob_func=lambda best, it: chi2.cdf(it.chisqr - best.chisqr, 1)`. Beside an offset, one
     parameter more, nothing is told of k_s.
     """
-    readings = crept(times, **SOLID) + 3e-3 * (given is OFFSET)
+    k_s, k_v, c_v = SOLID.values()
+    readings = 5 / k_s + 5 / k_v * (1 - np.exp(-times * k_v / c_v)) + 3e-3 * (given is OFFSET)
     readings += sd * np.random.default_rng(0).standard_normal(len(times))
     held: dict[str, Any] = {"reads": "strain", "hold": 5.0, "model": "zener_kelvin", "start": 0.0}
     found = told(times, readings, **held, **given).to_frame()
