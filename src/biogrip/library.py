@@ -368,8 +368,7 @@ def judge(
         Confidence level of the limits.
     """
     problem = experiment.of(as_column(time_s, "time_s"), as_column(readings, "readings"))
-    diagnosis = diagnose(problem, experiment.searched, found, confidence=confidence)
-    return with_times([diagnosis], experiment.searched)[0]
+    return with_times([diagnose(problem, found, confidence=confidence)])[0]
 
 
 def plot(experiment: Experiment, time_s: ArrayLike, readings: ArrayLike, found: Fit) -> "Figure":

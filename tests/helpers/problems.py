@@ -69,8 +69,8 @@ def likelihood_of(posed: TraceProblem, seed: int = 0) -> Likelihood:
     return make_likelihood(posed, np.log(found.parameters), found.misfit, confidence=0.95)
 
 
-def diagnosis_of(posed: TraceProblem, model: SampleModel, **known: Any) -> Diagnosis:
-    return diagnose(posed, model, run("least_squares", posed), confidence=0.95, **known)
+def diagnosis_of(posed: TraceProblem) -> Diagnosis:
+    return diagnose(posed, run("least_squares", posed), confidence=0.95)
 
 
 def condensed_of(torque: Course, time_s: Array, **nuisance: bool) -> Condensed:

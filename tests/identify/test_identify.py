@@ -10,14 +10,13 @@ import numpy as np
 import pytest
 import yaml
 
-from biogrip.arrays import Array
 from biogrip.identify.identify import identify
 from biogrip.library import INSTRUMENTS, BiogripError, Sample, hold, set_up
 from biogrip.stages.judgement import judge
 from biogrip.stages.targets import record
 from biogrip.study.source import overlaid
 from biogrip.traces.columns import Columns
-from biogrip.traces.reader import Recording, recording_of_arrays
+from biogrip.traces.reader import recording_of_arrays
 from tests.helpers.default import study_of
 from tests.helpers.identified import identified, write_trace
 
@@ -26,13 +25,6 @@ SECONDS = np.arange(4.0, 600.0, 4.0)
 SCATTER = 5e-5 * np.random.default_rng(3).standard_normal(len(SECONDS))
 # A soft tissue under 100 Pa: as its own equation has it, J = 1/k_s + (1 - exp(-t k_v/c_v))/k_v.
 STRAIN = 100 * (1 / 5e4 + (1 - np.exp(-SECONDS / 100)) / 2e4) + SCATTER
-STRAINS = Columns("time_s", "strain", quantity=INSTRUMENTS["strain"].read)
-
-
-def recorded(*, strain: Array = STRAIN, time_s: Array = SECONDS, **more: Any) -> Recording:
-    return recording_of_arrays(Columns(**{**vars(STRAINS), **more}), time_s, strain)
-
-
 FEW = {
     "model_selection": {"models": ["maxwell"]},
     "least_squares": {"candidates": 100, "starts": 4},
@@ -96,8 +88,10 @@ def test_a_message_names_array_and_index() -> None:
         ({"rows": {"step": 1}}, "measurement.rows: is only for a file, not for arrays."),
     ):
         creep = set_up(INSTRUMENTS["strain"], (hold(600.0, 100.0),), Sample("zener_kelvin"))
+        own: dict[str, Any] = {"time_s": SECONDS, "strain": STRAIN, "rows": None, **given}
+        columns = Columns("time_s", "strain", quantity=creep.instrument.read, rows=own["rows"])
         with pytest.raises(BiogripError, match=said):
-            identify(recorded(**given), creep)
+            identify(recording_of_arrays(columns, own["time_s"], own["strain"]), creep)
 
 
 def test_neither_study_nor_figures_are_loaded_for_a_trace() -> None:

@@ -8,24 +8,29 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import chi2
 
-from biogrip.arrays import Array
 from biogrip.judging.doubts import (
     DOUBT,
     DOUBTFUL,
     HARMLESS,
     OK,
+    Note,
     _about_growth,
     examine_residuals,
     find_slow_misfit,
     has_fast_noise,
 )
-from biogrip.judging.likelihood import make_likelihood
+from biogrip.judging.likelihood import Likelihood, make_likelihood
 from biogrip.library import identify_trace
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.noise import AR1, Noise, NoiseModel, Outliers, add_noise
 from tests.helpers.default import seen
 from tests.helpers.identified import told
 from tests.helpers.problems import MODEL, clean, likelihood_of, pose_noisy, posed_for, rotation
+
+
+def notes_on(likelihood: Likelihood) -> list[Note]:
+    _, find_notes = examine_residuals(likelihood)
+    return find_notes()
 
 
 @pytest.mark.parametrize(
@@ -47,7 +52,7 @@ def test_what_is_not_white_is_said(parts: dict[str, Any], place: int | None, sai
     trace = add_noise(response, noise, np.random.default_rng(0), times)
     if place is not None:
         trace[place] += response.max()
-    notes = examine_residuals(likelihood_of(posed_for(MODEL, times, trace))).find_notes()
+    notes = notes_on(likelihood_of(posed_for(MODEL, times, trace)))
     doubts = " ".join(note.text for note in notes if note.weight == DOUBT)
     assert said in doubts
     assert bool(doubts) == bool(said)
@@ -61,7 +66,7 @@ def test_what_a_misfit_has_in_a_row_is_no_outlier(neighbours: int, named: bool) 
     trace = response + noise * np.random.default_rng(0).standard_normal(len(times))
     trace += 2 * noise * np.sin(2 * np.pi * times / 100)
     trace[100 : 100 + neighbours] += 20 * noise
-    notes = examine_residuals(likelihood_of(posed_for(MODEL, times, trace))).find_notes()
+    notes = notes_on(likelihood_of(posed_for(MODEL, times, trace)))
     assert "is not noise" in notes[0].text
     assert any(", at 100 s" in note.text for note in notes) == named
 
@@ -74,7 +79,7 @@ def test_a_given_noise_is_held_against_what_parameters_leave(beyond: float, said
     fit = likelihood_of(problem)
     noise_sd = fit.misfit * np.sqrt(len(times) / (beyond * chi2.isf(0.003, 7)))
     held = make_likelihood(problem, fit.best, fit.misfit, confidence=0.95, noise_sd=noise_sd)
-    notes = examine_residuals(held).find_notes()
+    notes = notes_on(held)
     assert any("the noise that was given" in note.text for note in notes) == said
 
 
@@ -83,7 +88,7 @@ def test_where_nothing_is_left_no_noise_is_doubted() -> None:
     posed = posed_for(MODEL, times, rotation(MODEL, [1.0, 1.0, 10.0, 0.1], times, inertia=False))
     fit = likelihood_of(posed)
     held = make_likelihood(posed, fit.best, fit.misfit, confidence=0.95, noise_sd=1e-6)
-    assert examine_residuals(held).find_notes() == []
+    assert notes_on(held) == []
 
 
 TIMES = np.linspace(0.25, 100, 400)
@@ -117,29 +122,23 @@ def test_noise_that_grows_has_a_share_of_what_is_read() -> None:
     """A tenth of the readings is six times the others, with noise of 2 % of each."""
     growth = np.repeat([2.0, 12.0], [90, 10])
     read = seen(instrument=INSTRUMENTS["modulus"], coloured=False, response=lambda _: 200 * growth)
-    (said,) = _about_growth(growth, 4.0, read, np.zeros(1))
+    likelihood = seen(problem=seen(residuals=read), best=np.zeros(1))
+    (said,) = _about_growth(seen(likelihood=likelihood, growth=growth, scale=4.0))
     assert "it is 6 times as large for the largest tenth of the readings" in said
     assert said.endswith("weighted by --noise-share 0.02.")
 
 
-def left_by(noise: str) -> Array:
-    """Four hundred residuals: of fast noise, with a burst of it, or of a smooth misfit."""
+def test_fast_noise_is_neither_smooth_nor_in_one_place() -> None:
+    """Neighbours of a smooth misfit differ by 1, and all of it scatters by 14."""
     time_s, rng = np.arange(400.0), np.random.default_rng(0)
-    if noise == "smooth":
-        return 20 * np.sin(2 * np.pi * time_s / 10) + rng.standard_normal(400)
-    fast = lfilter([1.0], [1.0, -0.6], rng.standard_normal(500))[100:]
-    if noise == "burst":
-        # Then 45 % of all squares are those of a twentieth.
-        fast[:20] *= np.sqrt(0.45 / 0.55 * np.sum(fast[20:] ** 2) / np.sum(fast[:20] ** 2))
-    return fast
-
-
-@pytest.mark.parametrize(("noise", "fast"), [("fast", True), ("burst", False), ("smooth", False)])
-def test_fast_noise_is_neither_smooth_nor_in_one_place(noise: str, fast: bool) -> None:
-    """Neighbours of the smooth misfit differ by 1, and all of it scatters by 14."""
-    time_s = np.arange(400.0)
     residuals = seen(trace=seen(time_s=time_s), coloured=False, duration_s=399.0, noise_scale=1.0)
-    assert has_fast_noise(residuals, left_by(noise), np.ones((1, 400))) == fast
+    fast = lfilter([1.0], [1.0, -0.6], rng.standard_normal(500))[100:]
+    # Of a burst are 45 % of all squares, in a twentieth of the readings.
+    most = np.sqrt(0.45 / 0.55 * np.sum(fast[20:] ** 2) / np.sum(fast[:20] ** 2))
+    burst = fast * np.where(time_s < 20, most, 1.0)
+    smooth = 20 * np.sin(2 * np.pi * time_s / 10) + rng.standard_normal(400)
+    found = [has_fast_noise(residuals, it, np.ones((1, 400))) for it in (fast, burst, smooth)]
+    assert found == [True, False, False]
 
 
 def test_share_and_time_less_its_error_decide() -> None:

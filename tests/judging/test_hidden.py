@@ -30,7 +30,7 @@ NOISY = CLEAN + NOISE * np.random.default_rng(0).standard_normal(100)
 def diagnosed(experiment: Experiment, sample: Mapping[str, float]) -> Diagnosis:
     problem = experiment.of(TIMES, NOISY)
     found = identify_from(problem, experiment.logs(sample))
-    return diagnose(problem, experiment.searched, found, confidence=0.95)
+    return diagnose(problem, found, confidence=0.95)
 
 
 JUDGED = diagnosed(EXPERIMENT, SAMPLE)

@@ -70,7 +70,7 @@ def test_quantities_and_their_gradients() -> None:
 
 @functools.cache
 def told(case: str) -> Diagnosis:
-    return diagnosis_of(problem(case, 4, rate_Hz=10.0), MODEL)
+    return diagnosis_of(problem(case, 4, rate_Hz=10.0))
 
 
 YES, ABOVE, NO = DETERMINED, BOUNDED_ABOVE, NOT_DETERMINED
@@ -113,7 +113,7 @@ def test_elements_of_spring_and_damper_have_a_time() -> None:
 
 def test_the_valley_is_as_deep_along_the_sum_as_the_profile_says() -> None:
     diagnosis, likelihood = told("liquid_drop_1"), told("liquid_drop_1").likelihood
-    valley, _ = compute_valley(likelihood, MODEL)
+    valley, _ = compute_valley(likelihood)
     assert valley is not None
     along, arm = ({key: np.array(grid[key]) for key in grid} for grid in valley["grids"])
     increases = along["increases"]
@@ -127,18 +127,19 @@ def test_the_valley_is_as_deep_along_the_sum_as_the_profile_says() -> None:
     lowest = arm["increases"].min(axis=0)[arm["x_values"][0] > 0.5 * best]
     assert max(lowest) < likelihood.certainty
     assert np.ptp(lowest) < 0.5
-    assert compute_valley(likelihood, MODELS["maxwell"]) == (None, None)
+    of_two: Any = seen(problem=seen(residuals=seen(model=MODELS["maxwell"])))
+    assert compute_valley(of_two) == (None, None)
     # A point of the valley that lies below what was taken for the best fit is told.
     c, c_p = np.exp(likelihood.best[2:, None, None])
     for times, expected in ((1.0, None), (1.01, pytest.approx(likelihood.best, abs=1e-3))):
         above = replace(likelihood, misfit=times * likelihood.misfit)
         assert _increases(above, [2, 3], c * [[0.9, 1.0, 1.1]], c_p * np.ones(3))[1] == expected
-    missed = _with_valley(replace(diagnosis, likelihood=above, lowest=None), MODEL).lowest
+    missed = _with_valley(replace(diagnosis, likelihood=above, lowest=None)).lowest
     assert missed is not None
     assert np.exp(missed[2:]).sum() == pytest.approx(best, rel=0.02)
     # A profile's counts first.
     found = replace(diagnosis, likelihood=above, lowest=likelihood.best)
-    assert _with_valley(found, MODEL).lowest is likelihood.best
+    assert _with_valley(found).lowest is likelihood.best
 
 
 @pytest.mark.parametrize("name", ["springpots_in_series", "springpots_in_parallel"])
@@ -165,7 +166,7 @@ def test_an_optimum_is_one_to_a_twentieth_of_chi_squared(rise: float) -> None:
     misfit = float(problem.residuals.misfit(elsewhere[None])[0])
     assert likelihood.increase(misfit) == pytest.approx(rise, rel=0.1)
     missed = replace(best, parameters=elsewhere, misfit=misfit)
-    (taken,) = diagnose(problem, DAMPER, missed, confidence=0.95).likelihood.best
+    (taken,) = diagnose(problem, missed, confidence=0.95).likelihood.best
     assert np.exp(taken) == pytest.approx(elsewhere[0] if rise < 0.05 else best.parameters[0])
 
 

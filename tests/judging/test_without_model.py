@@ -42,7 +42,7 @@ def tell(
     """What a trace tells without a model."""
     posed = replace(set_up(gripper or INSTRUMENTS[reads], phases, Sample("maxwell")), **known)
     residuals = posed.of(time_s, readings).residuals
-    return tell_without_model(residuals, confidence=0.95, noise_sd=posed.noise_sd, at_s=at_s)
+    return tell_without_model(residuals, confidence=0.95, at_s=at_s)
 
 
 def by_name(found: WithoutModel) -> dict[str, Told]:

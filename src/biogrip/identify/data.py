@@ -4,10 +4,10 @@ from typing import Any
 
 import numpy as np
 
-from biogrip.digits import counted, round_increase
+from biogrip.digits import counted, plain, round_increase
 from biogrip.fit.experiment import Experiment
 from biogrip.judging.diagnosis import Diagnosis
-from biogrip.judging.doubts import REJECTED, REJECTION, compute_status, find_reasons, order_notes
+from biogrip.judging.doubts import REJECTED, REJECTION, find_reasons, order_notes
 from biogrip.judging.verdicts import FIT_REJECTED, Finding
 from biogrip.physics.noise import within
 from biogrip.physics.simulation import simulated_response
@@ -22,14 +22,13 @@ def judged_data(diagnosis: Diagnosis) -> dict[str, Any]:
     reading the file speak of results that it does not have, and are left out.
     """
     likelihood, notes = diagnosis.likelihood, diagnosis.notes
-    status = compute_status(notes)
-    rejected = status == REJECTED
+    rejected = diagnosis.status == REJECTED
     if rejected:
         remarks = diagnosis.recording.remarks() if diagnosis.recording else []
         notes = [note for note in notes if note.weight == REJECTION or note.text in remarks]
     ordered = order_notes(notes)
     return {
-        "fit": status,
+        "fit": diagnosis.status,
         "reasons": find_reasons(ordered),
         "samples": likelihood.problem.residuals.samples,
         "misfit_rad": likelihood.misfit,
@@ -40,7 +39,7 @@ def judged_data(diagnosis: Diagnosis) -> dict[str, Any]:
         "quantities": [_finding(each, rejected=rejected) for each in diagnosis.findings],
         "hidden": [
             {"words": each.words(), "moves": each.moves}
-            for each in ([] if rejected else diagnosis.hidden)
+            for each in diagnosis.hidden
             if each.beyond[1] > 1
         ],
         "trades": [
@@ -52,12 +51,13 @@ def judged_data(diagnosis: Diagnosis) -> dict[str, Any]:
             for trade in ([] if rejected else diagnosis.trades)
         ],
         **({"jaw_force": dict(vars(diagnosis.grip))} if diagnosis.grip else {}),
-        "notes": [dict(vars(note)) for note in ordered],
+        "notes": [{"weight": note.weight, "text": note.text} for note in ordered],
     }
 
 
 def _finding(finding: Finding, *, rejected: bool) -> dict[str, Any]:
     profile = finding.profile
+    best = f"{plain(finding.value)} {finding.quantity.unit}".rstrip()
     return {
         "quantity": finding.quantity.label,
         "symbol": finding.quantity.symbol,
@@ -69,7 +69,7 @@ def _finding(finding: Finding, *, rejected: bool) -> dict[str, Any]:
         "excluded": [] if rejected else [[start, end] for start, end in finding.gaps],
         "deviation": finding.deviation,
         "provided": finding.quantity.provided,
-        "in_words": f"fit rejected: the best fit, {finding.best_in_words}, is not to be used"
+        "in_words": f"fit rejected: the best fit, {best}, is not to be used"
         if rejected
         else finding.words(),
         "profile": {

@@ -9,7 +9,7 @@ The command, the library and the rules of a study all do this. Traces of the sam
 are fitted together; the result of a trace is the same, to the last bit, in any batch and alone.
 """
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -79,78 +79,58 @@ def identify_alike(
     doing("finding confidence limits")
     judged = diagnose_all(
         [fit.problem for fit in fits],
-        first.searched,
         [fit.found for fit in fits],
         confidence=first.confidence,
-        noise_sd=[experiment.noise_sd for experiment in experiments],
         valley=valley,
     )
     if not first.simulated:
         doing("trying other sample models")
-        judged = _compared(traces, fits, judged, valley=valley)
-    onsets_s: list[tuple[float, float] | None] = [None] * len(traces)
+        models = models_tried(traces, fits, judged)
+        judged = [
+            replace(judge_again(fit, own, tried, valley=valley), models=tried)
+            for fit, own, tried in zip(fits, judged, models, strict=True)
+        ]
+        judged = with_times(judged)
     for index, (recording, experiment) in enumerate(traces):
         if experiment.fit_start:
-            judged[index], onsets_s[index] = profile_over_onset(judged[index], recording.time_s)
-    if not experiments[0].instrument.sweeps:
+            judged[index] = profile_over_onset(judged[index], recording.time_s)
+    if not first.instrument.sweeps:
         doing("trying an offset and a drift")
     notes = [_notes_on_fit(*pair) for pair in zip(fits, experiments, strict=True)]
     if not first.simulated:
-        notes = _notes_on_traces(traces, judged, notes)
+        given = zip(traces, judged, notes, second_opinions(traces, judged), strict=True)
+        notes = [[*_notes_on_trace(*trace, own, *said)] for trace, own, *said in given]
     return [
-        replace(
-            judged[index],
-            notes=[*judged[index].notes, *notes[index]],
-            recording=recording,
-            experiment=experiment,
-            fit=fits[index],
-            onset_limits_s=onsets_s[index],
-        )
-        for index, (recording, experiment) in enumerate(traces)
+        replace(own, notes=[*own.notes, *more], recording=recording, experiment=experiment, fit=fit)
+        for (recording, experiment), fit, own, more in zip(traces, fits, judged, notes, strict=True)
     ]
 
 
-def _compared(
-    traces: Sequence[Trace], fits: Sequence[TraceFit], judged: Sequence[Diagnosis], *, valley: bool
-) -> list[Diagnosis]:
-    """Return diagnoses with other models, again where their own was fitted better, and times."""
-    models = models_tried(traces, fits, judged)
-    again = [
-        replace(judge_again(experiment, fit, diagnosis, tried, valley=valley), models=tried)
-        for (_, experiment), fit, diagnosis, tried in zip(traces, fits, judged, models, strict=True)
-    ]
-    return with_times(again, traces[0][1].searched)
-
-
-def _notes_on_traces(
-    traces: Sequence[Trace], judged: Sequence[Diagnosis], on_fits: Sequence[list[Note]]
-) -> list[list[Note]]:
-    """Return notes on the reading of each trace, its fit, its start, and terms not declared."""
-    opinions = second_opinions(traces, judged)
-    notes = []
-    for index, (recording, experiment) in enumerate(traces):
-        said = [Note(HARMLESS, text) for text in recording.remarks()]
-        if experiment.fixed:
-            fixed = (
-                f"{' and '.join(experiment.fixed)} {'were' if len(experiment.fixed) > 1 else 'was'}"
-            )
-            said.append(Note(HARMLESS, f"Other models are not compared, because {fixed} fixed."))
-        said += on_fits[index]
-        if experiment.instrument.sweeps:
-            notes.append(said)
-            continue
-        given = recording.time_s, recording.readings, judged[index]
-        start = notes_on_start(experiment, *given)
-        said += start
-        doubts = [note.text for note in judged[index].notes if note.weight == DOUBT]
-        rounded = any(text.startswith(ROUNDED) for text in doubts)
-        # Beside another start, or errors of rounding, an offset and a drift mean nothing.
-        if not rounded and all(note.weight == HARMLESS for note in start):
-            said += opinions[index]
-        said += note_flow(recording, experiment)
-        said += [] if rounded else note_saturated(recording, experiment)
-        notes.append(said)
-    return notes
+def _notes_on_trace(
+    recording: Recording,
+    experiment: Experiment,
+    judged: Diagnosis,
+    on_fit: list[Note],
+    opinion: list[Note],
+) -> Iterator[Note]:
+    """Yield notes on the reading of a trace, its fit, its start, and terms not declared."""
+    for text in recording.remarks():
+        yield Note(HARMLESS, text)
+    if fixed := " and ".join(experiment.fixed):
+        were = "were" if len(experiment.fixed) > 1 else "was"
+        yield Note(HARMLESS, f"Other models are not compared, because {fixed} {were} fixed.")
+    yield from on_fit
+    if experiment.instrument.sweeps:
+        return
+    start = notes_on_start(experiment, recording.time_s, recording.readings, judged)
+    yield from start
+    rounded = any(note.about == ROUNDED and note.weight == DOUBT for note in judged.notes)
+    # Beside another start, or errors of rounding, an offset and a drift mean nothing.
+    if not rounded and all(note.weight == HARMLESS for note in start):
+        yield from opinion
+    yield from note_flow(recording, experiment)
+    if not rounded:
+        yield from note_saturated(recording, experiment)
 
 
 def _notes_on_fit(fit: TraceFit, experiment: Experiment) -> list[Note]:

@@ -27,7 +27,7 @@ from scipy.special import chdtri
 from biogrip.arrays import Array
 from biogrip.fit.any_sample import fit_responses, spread_lags
 from biogrip.fit.experiment import Experiment
-from biogrip.judging.levels import FEWEST_BEFORE, HELD, SURELY
+from biogrip.judging import levels
 from biogrip.physics.modes import lag_course
 from biogrip.physics.noise import without
 from biogrip.traces.reader import Recording
@@ -68,13 +68,13 @@ def tare_of(experiment: Experiment, recording: Recording) -> float:
     record, load, start_s = experiment.record, recording.load, recording.read.start_s or 0.0
     if record is None or load is None or experiment.instrument.relative or recording.read.sphere_m:
         return 0.0
-    same = np.abs(load[:, 1] - load[0, 1]) < HELD * np.ptp(load[:, 1])
+    same = np.abs(load[:, 1] - load[0, 1]) < levels.HELD * np.ptp(load[:, 1])
     first = load[: int(np.argmin(same)), 1]
-    if len(first) < FEWEST_BEFORE or abs(tare := float(np.median(first))) <= np.std(first):
+    if len(first) < levels.FEWEST_BEFORE or abs(tare := float(np.median(first))) <= np.std(first):
         return 0.0
     given = recording.time_s - start_s, recording.readings
     rest = _left(replace(experiment, offset=True), (record, record - (0.0, tare)), *given)
-    better = chdtri(1, SURELY) / min(len(load), _MOST_READINGS)
+    better = chdtri(1, levels.SURELY) / min(len(load), _MOST_READINGS)
     return tare if rest[0] > rest[1] * np.exp(better if load[0, 0] >= start_s else -better) else 0.0
 
 

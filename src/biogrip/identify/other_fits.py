@@ -9,7 +9,7 @@ ratio: if neither is in the trace, the decrease of chi^2 follows a chi-squared d
 many degrees of freedom as terms are added (Wilks 1938).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -38,6 +38,7 @@ from biogrip.fit.noise_model_fit import absorbed, compare_extremes, compute_grow
 from biogrip.fit.problem import Fit, Progress, TraceProblem, silent
 from biogrip.fit.trace_fit import TraceFit, fit_least_squares
 from biogrip.identify.prepare import flow_of, for_trace
+from biogrip.judging import levels
 from biogrip.judging.diagnosis import Diagnosis, diagnose
 from biogrip.judging.doubts import (
     DOUBT,
@@ -47,15 +48,6 @@ from biogrip.judging.doubts import (
     Note,
     compute_status,
     examine_residuals,
-)
-from biogrip.judging.levels import (
-    CLEARLY,
-    FALSE_ALARM,
-    FAR_BETTER,
-    FEWEST_VALUES,
-    MISSED,
-    MORE_OFTEN,
-    SATURATED,
 )
 from biogrip.judging.likelihood import compute_fall, make_likelihood
 from biogrip.judging.onset import OnsetFits
@@ -87,17 +79,6 @@ def fits_of(traces: Sequence[Trace], progress: Progress) -> list[TraceFit]:
     return fit_least_squares(experiments, posed, rngs, progress)
 
 
-def _diagnosed(experiment: Experiment, fit: TraceFit, found: Fit, *, valley: bool) -> Diagnosis:
-    return diagnose(
-        fit.problem,
-        experiment.searched,
-        found,
-        confidence=experiment.confidence,
-        noise_sd=experiment.noise_sd,
-        valley=valley,
-    )
-
-
 def models_tried(
     traces: Sequence[Trace], fits: Sequence[TraceFit], diagnoses: Sequence[Diagnosis]
 ) -> list[FittedModels]:
@@ -124,12 +105,10 @@ _Own = tuple[Trace, TraceFit, Diagnosis]
 def _one_branch_more(own: _Own, models: FittedModels) -> str | None:
     """Return the model with one branch more than the best one, if it was not tried and may be."""
     (_, experiment), fit, _ = own
-    if not experiment.usual_models:
-        return None
     name = one_branch_more(models.tried, adequate=models.adequate)
-    if name in models.spared:
+    if not experiment.usual_models or name is None or name in models.spared:
         return None
-    return name if name and len(CANDIDATES[name].model.names) <= _most(experiment, fit) else None
+    return name if len(CANDIDATES[name].model.names) <= _most(experiment, fit) else None
 
 
 def _tried(own: Sequence[_Own], names: Sequence[str]) -> list[FittedModels]:
@@ -208,7 +187,8 @@ def _leaves_noise(experiment: Experiment, problem: TraceProblem, answer: Fit) ->
         confidence=experiment.confidence,
         noise_sd=experiment.noise_sd,
     )
-    return compute_status(examine_residuals(likelihood).find_notes()) != REJECTED
+    _, find_notes = examine_residuals(likelihood)
+    return compute_status(find_notes()) != REJECTED
 
 
 def _growth(diagnosis: Diagnosis) -> Array | None:
@@ -222,7 +202,7 @@ def _growth(diagnosis: Diagnosis) -> Array | None:
     growth = compute_growth(
         residuals.left(best), residuals.response(best), residuals.trace.rounding
     )
-    return growth if compare_extremes(growth) > CLEARLY else None
+    return growth if compare_extremes(growth) > levels.CLEARLY else None
 
 
 def _misfits(
@@ -258,7 +238,7 @@ _SAME_NETWORK = "liquid_drop", "zener_maxwell"
 
 def _candidates(experiment: Experiment, fit: TraceFit) -> tuple[str, ...]:
     """Return the names of the models to fit to a trace, none if nothing is compared."""
-    if experiment.fixed or experiment.simulated:
+    if experiment.fixed:
         return ()
     residuals, chosen = fit.problem.residuals, experiment.sample.candidate
     # One network has one name: that asked for, or else that which is usual for the instrument.
@@ -283,12 +263,7 @@ def _most(experiment: Experiment, fit: TraceFit) -> int:
 
 
 def judge_again(
-    experiment: Experiment,
-    fit: TraceFit,
-    diagnosis: Diagnosis,
-    models: FittedModels,
-    *,
-    valley: bool,
+    fit: TraceFit, diagnosis: Diagnosis, models: FittedModels, *, valley: bool
 ) -> Diagnosis:
     """Diagnose a trace again if its own model was fitted better, within the search range, since.
 
@@ -296,10 +271,11 @@ def judge_again(
     range.
     """
     own = models.answers.get(models.chosen)
-    if own is None or (increase := diagnosis.likelihood.increase(own.misfit)) > -MISSED:
+    if own is None or (increase := diagnosis.likelihood.increase(own.misfit)) > -levels.MISSED:
         return diagnosis
     if is_within(own.parameters, fit.problem):
-        return _diagnosed(experiment, fit, own, valley=valley)
+        confidence = diagnosis.likelihood.confidence
+        return diagnose(fit.problem, own, confidence=confidence, valley=valley)
     gone = vanished(models.chosen, own)
     where = f", without {' and '.join(gone)}" if gone else ""
     text = (
@@ -330,12 +306,13 @@ def second_opinions(traces: Sequence[Trace], diagnoses: Sequence[Diagnosis]) -> 
     offsets = _better(traces, diagnoses, alone, drift=False)
     for index, other in both.items():
         one = offsets.get(index)
-        if one and chdtrc(1, max(other.fall - one.fall, 0.0)) >= FALSE_ALARM:
+        if one and chdtrc(1, max(other.fall - one.fall, 0.0)) >= levels.FALSE_ALARM:
             other = one
-        judged = _diagnosed(other.trace[1], other.fit, other.fit.found, valley=False)
+        confidence = diagnoses[index].likelihood.confidence
+        judged = diagnose(other.fit.problem, other.fit.found, confidence=confidence)
         terms = np.log(len(traces[index][0].time_s)) * other.added
         models = diagnoses[index].models
-        led = models is not None and models.lead > other.fall - terms + FAR_BETTER
+        led = models is not None and models.lead > other.fall - terms + levels.FAR_BETTER
         if not (led or diagnoses[index].status == judged.status == REJECTED):
             notes[index].append(_note(traces[index], diagnoses[index], other, judged))
     return notes
@@ -357,8 +334,11 @@ def _better(
     """Return fits with an offset, or a drift, too, by index, if they are better."""
     if not which:
         return {}
-    also = [_with_terms(*traces[index], drift=drift) for index in which]
-    found = {}
+    also, found = [], {}
+    for recording, experiment in (traces[index] for index in which):
+        # As if the user had declared them.
+        declared = replace(experiment, offset=True, drift=drift or experiment.drift)
+        also.append((recording, for_trace(declared, recording)))
     for index, own, fit in zip(which, also, fits_of(also, silent), strict=True):
         experiment, likelihood = traces[index][1], diagnoses[index].likelihood
         fall = compute_fall(
@@ -368,15 +348,9 @@ def _better(
             likelihood.noise_sd if experiment.noise_sd is not None else None,
         )
         added = own[1].offset_and_drift - experiment.offset_and_drift
-        if (chance := float(chdtrc(added, max(fall, 0.0)))) < FALSE_ALARM:
+        if (chance := float(chdtrc(added, max(fall, 0.0)))) < levels.FALSE_ALARM:
             found[index] = _Other(own, fit, fall, chance, added)
     return found
-
-
-def _with_terms(recording: Recording, experiment: Experiment, *, drift: bool) -> Trace:
-    """Return a trace as if the user had declared an offset, or a drift, too."""
-    experiment = replace(experiment, offset=True, drift=drift or experiment.drift)
-    return recording, for_trace(experiment, recording)
 
 
 def _note(trace: Trace, diagnosis: Diagnosis, other: _Other, judged: Diagnosis) -> Note:
@@ -425,42 +399,40 @@ def _note(trace: Trace, diagnosis: Diagnosis, other: _Other, judged: Diagnosis) 
     return Note(REJECTION if rejected else weight, text)
 
 
-def note_flow(recording: Recording, experiment: Experiment) -> list[Note]:
+def note_flow(recording: Recording, experiment: Experiment) -> Iterator[Note]:
     """Say of a damper that lets the sample flow that a drift would look the same."""
     damper = flow_of(experiment)
-    if not damper or not drift_is_flow(experiment.torque, recording.time_s):
-        return []
-    held = f"{damper} holds if the instrument does not drift"
-    if experiment.drift:
-        held = f"of {damper} and the drift that is fitted along, only the sum is determined"
-    text = (
-        f"Under a constant {experiment.instrument.controlled.name} a drift of the instrument and "
-        f"the flow of the sample are one line: {held}."
-    )
-    return [Note(HARMLESS, text)]
+    if damper and drift_is_flow(experiment.torque, recording.time_s):
+        held = f"{damper} holds if the instrument does not drift"
+        if experiment.drift:
+            held = f"of {damper} and the drift that is fitted along, only the sum is determined"
+        yield Note(
+            HARMLESS,
+            f"Under a constant {experiment.instrument.controlled.name} a drift of the instrument "
+            f"and the flow of the sample are one line: {held}.",
+        )
 
 
-def note_saturated(recording: Recording, experiment: Experiment) -> list[Note]:
-    """Return a doubt if many readings after the start are exactly the largest, or the smallest.
+def note_saturated(recording: Recording, experiment: Experiment) -> Iterator[Note]:
+    """Yield a doubt if many readings after the start are exactly the largest, or the smallest.
 
     Readings that are only rounded have neighbouring values nearly as often.
     """
     values, counts = np.unique(recording.readings[recording.time_s > 0], return_counts=True)
-    unit, notes = f" {experiment.instrument.read.unit}".rstrip(), []
+    if len(values) < levels.FEWEST_VALUES:
+        return
+    unit, least = f" {experiment.instrument.read.unit}".rstrip(), levels.SATURATED * np.sum(counts)
     for end, at, near in (
-        ("largest", -1, slice(-FEWEST_VALUES, -1)),
-        ("smallest", 0, slice(1, FEWEST_VALUES)),
+        ("largest", -1, counts[-levels.FEWEST_VALUES : -1]),
+        ("smallest", 0, counts[1 : levels.FEWEST_VALUES]),
     ):
-        if len(values) < FEWEST_VALUES or counts[at] <= SATURATED * np.sum(counts):
-            continue
-        if counts[at] > MORE_OFTEN * np.max(counts[near]):
-            text = (
+        if counts[at] > max(least, levels.MORE_OFTEN * np.max(near)):
+            yield Note(
+                DOUBT,
                 f"{counts[at]} of {np.sum(counts)} readings are exactly the {end}, "
                 f"{plain(values[at])}{unit}: the instrument looks saturated, and what it cut off "
-                "is missing."
+                "is missing.",
             )
-            notes.append(Note(DOUBT, text))
-    return notes
 
 
 def _differ(before: Finding, after: Finding) -> bool:

@@ -10,21 +10,14 @@ from collections.abc import Callable, Mapping
 from operator import itemgetter
 
 import numpy as np
-from scipy.special import ndtri
+from scipy.special import fdtri, ndtri
 
 from biogrip.arrays import Array
 from biogrip.digits import plain
 from biogrip.errors import BiogripError
 from biogrip.fit.any_sample import fit_responses
 from biogrip.fit.experiment import Experiment
-from biogrip.judging.levels import (
-    BELOW_ZERO,
-    FAR_ABOVE,
-    LARGEST_SHARE,
-    NO_RESPONSE,
-    SHORTEST_SHARE,
-    SMALLEST_SHARE,
-)
+from biogrip.judging import levels
 from biogrip.physics.modes import lag_course
 from biogrip.physics.noise import nuisance_basis, without
 from biogrip.physics.protocol import SWEEP, Course, largest_load
@@ -37,7 +30,7 @@ _APART = 100.0
 _TIME_SLACK = 1e-5
 _LAG_SHARES = (1e-9, 0.03, 0.1, 0.3, 1.0, 10.0)
 # Log-likelihood ratio, times two, above which a trace counts as mirrored.
-_FAR_LIKELIER = -2 * math.log(NO_RESPONSE)
+_FAR_LIKELIER = -2 * math.log(levels.NO_RESPONSE)
 # Share of a function's norm that may be rounding error.
 _ROUNDING = 1e-9
 # What makes a loss modulus negative, and a storage modulus.
@@ -125,7 +118,7 @@ def check_moduli(sweep: Recording, sd: Array | float) -> None:
 
     The noise has standard deviations `sd`, (n_samples,), 0 where nothing says it.
     """
-    least = np.broadcast_to(sd * ndtri(BELOW_ZERO), sweep.readings.shape)
+    least = np.broadcast_to(sd * ndtri(levels.BELOW_ZERO), sweep.readings.shape)
     for sample in np.flatnonzero(sweep.readings <= least)[:1]:
         at, found = float(sweep.time_s[sample]), sweep.readings[sample]
         above = f"{plain(least[sample], 2)} by the noise that is given" if least[sample] else "0"
@@ -146,10 +139,9 @@ def _either_sign(trace: Array, responses: Array, nuisance: Array) -> list[tuple[
 
 def _responds(trace: Array, nuisance: Array, rest: float, unknowns: int, freedom: int) -> bool:
     """Return True if responses explain more than they would of white noise, by an F test."""
-    from scipy.special import fdtri
-
     explained = float(np.sum(without(nuisance, trace) ** 2)) - rest
-    return bool(explained > unknowns * fdtri(unknowns, freedom, 1 - NO_RESPONSE) * rest / freedom)
+    needed = fdtri(unknowns, freedom, 1 - levels.NO_RESPONSE)
+    return bool(explained > unknowns * needed * rest / freedom)
 
 
 def _check_times(recording: Recording, torque: Course) -> None:
@@ -158,7 +150,7 @@ def _check_times(recording: Recording, torque: Course) -> None:
     begins = onset_s or 0.0
     time_s, earliest = recording.time_s, -slack if onset_s is None else -np.inf
     clock_s = time_s + begins
-    shortest = SHORTEST_SHARE * end_s
+    shortest = levels.SHORTEST_SHARE * end_s
 
     def fits(factor: float) -> bool:
         first, last = factor * clock_s[[0, -1]] - begins
@@ -188,7 +180,8 @@ def _check_times(recording: Recording, torque: Course) -> None:
 def _check_turn(
     recording: Recording, turn: float, free: float, noise_sd: float | None
 ) -> str | None:
-    columns, smallest, largest = recording.read, SMALLEST_SHARE * free, LARGEST_SHARE * free
+    columns = recording.read
+    smallest, largest = levels.SMALLEST_SHARE * free, levels.LARGEST_SHARE * free
 
     def fits(factor: float) -> bool:
         return smallest <= factor * turn <= largest
@@ -197,7 +190,7 @@ def _check_turn(
         return None
     hint = _other_units(recording.units[1], columns.quantity.units, fits)
     alone = f"without any sample the arm turns by {free:.3g} rad"
-    if noise_sd is not None and FAR_ABOVE * noise_sd < turn < smallest:
+    if noise_sd is not None and levels.FAR_ABOVE * noise_sd < turn < smallest:
         return (
             f"The largest rotation is {turn:.3g} rad, where {alone}: the sample is very stiff, or "
             f"the unit is not the right one.{hint}"
@@ -205,8 +198,8 @@ def _check_turn(
     limit = f"at most {largest:.3g} rad: {alone}"
     if turn < smallest:
         limit = (
-            f"at least {smallest:.3g} rad, or less with a given noise (--noise) {FAR_ABOVE:g} "
-            f"times smaller still, where {alone}"
+            f"at least {smallest:.3g} rad, or less with a given noise (--noise) "
+            f"{levels.FAR_ABOVE:g} times smaller still, where {alone}"
         )
     sample = int(np.argmax(np.abs(recording.readings)))
     raise BiogripError(

@@ -24,7 +24,7 @@ from biogrip.fit.experiment import Experiment
 from biogrip.fit.genome import GeneRange
 from biogrip.identify.load_noise import tare_of, without_noise
 from biogrip.identify.plausibility import check_moduli, check_recording
-from biogrip.judging.levels import ALIKE, ONE_STEP, REPEATED
+from biogrip.judging import levels
 from biogrip.judging.onset import OnsetFits, estimate_onset
 from biogrip.physics.fractional import LONGEST_S, SHORTEST_S
 from biogrip.physics.noise import MOST_SAMPLES, drift_is_flow, estimate_noise, measure_rounding
@@ -173,10 +173,9 @@ def without_repeats(trace: Recording) -> Recording:
     kept = np.append(True, changes != 0)
     at_ends = np.abs(changes[1:][~kept[1:-1] & kept[2:]])
     runs = np.diff(np.append(np.flatnonzero(kept), len(kept)))
-    held = np.mean(~kept) > REPEATED and np.max(runs) <= ALIKE * np.median(runs)
-    if not (
-        held and len(at_ends) and np.median(at_ends) > ONE_STEP * measure_rounding(trace.readings)
-    ):
+    held = np.mean(~kept) > levels.REPEATED and np.max(runs) <= levels.ALIKE * np.median(runs)
+    step = levels.ONE_STEP * measure_rounding(trace.readings)
+    if not (held and len(at_ends) and np.median(at_ends) > step):
         return trace
     said = (
         "Left out, for they repeat the one before, as of a sensor that is read less often than it "

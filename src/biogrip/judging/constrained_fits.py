@@ -143,7 +143,7 @@ class QuantityConstraint:
         which = self._which[fit]
         forms, stiffness = self._forms[which], self._stiffness[which] * self._unit[fit]
         beyond = np.sum(forms * x[:, None], axis=2) - self._allowed[which]
-        late = (beyond > 0) & (stiffness > 0)
+        late = beyond > 0
         slopes = stiffness[:, :, None] * forms * late[:, :, None]
         return np.where(late, stiffness * beyond, 0.0), slopes
 

@@ -25,33 +25,31 @@ from biogrip.fit.least_squares import fit_from
 from biogrip.fit.nested_fits import FittedModels
 from biogrip.fit.problem import Fit, TraceProblem
 from biogrip.fit.trace_fit import TraceFit
+from biogrip.judging import levels
 from biogrip.judging.doubts import (
     DOUBT,
     HARMLESS,
     REJECTED,
     REJECTION,
+    RING,
     ROUNDED,
+    FindNotes,
     Note,
-    Remainder,
     compute_status,
     examine_residuals,
 )
 from biogrip.judging.hidden import Hidden, find_hidden
-from biogrip.judging.levels import BEYOND_THE_RANGE, FAR_OFF, MISSED
 from biogrip.judging.likelihood import Likelihood, check_rows, make_likelihood
 from biogrip.judging.profiles import compute_valley
 from biogrip.judging.quantities import characteristic_times, parameters_and_sum
 from biogrip.judging.verdicts import DETERMINED, Finding, Trade, compute_findings, find_trade_offs
 from biogrip.judging.without_model import KINDS, WithoutModel, decades, tell_without_model
-from biogrip.physics.sample_model import C_P, SampleModel
+from biogrip.physics.sample_model import C_P
 from biogrip.physics.simulation import Grip
 from biogrip.traces.reader import Recording
 
 # Widening of a range, and the start beyond its end, in e-folds; and rounding.
 _WIDER, _BEYOND, _AT_END = np.log(1e3), 1.0, 1e-9
-
-RING = "The arms ring"
-"""Beginning of the note on ringing."""
 
 
 @dataclass(frozen=True)
@@ -97,19 +95,14 @@ class Diagnosis:
 
         Where none gives the trace, as the best of them would be rejected, nothing is told.
         """
-        residuals, experiment = self.likelihood.problem.residuals, self.experiment
-        tell = partial(
-            tell_without_model,
-            confidence=self.likelihood.confidence,
-            noise_sd=experiment.noise_sd if experiment else None,
-            kinds=kinds,
-        )
+        residuals = self.likelihood.problem.residuals
+        tell = partial(tell_without_model, confidence=self.likelihood.confidence, kinds=kinds)
         found = tell(residuals, at_s=at_s)
         if self.onset_limits_s:
             starts, times = map(residuals.later, self.onset_limits_s), decades(*found.covered_s)
             found = found.widened([tell(start, at_s=at_s or times) for start in starts])
-        # Beyond the noise.
-        far_off = found.misfit**2 - residuals.noise_scale**2 > (FAR_OFF * residuals.peak) ** 2
+        beyond_noise = found.misfit**2 - residuals.noise_scale**2
+        far_off = beyond_noise > (levels.FAR_OFF * residuals.peak) ** 2
         hopeless = far_off and not found.is_linear and self.status == REJECTED
         return replace(found, told=[]) if hopeless else found
 
@@ -126,45 +119,35 @@ class Diagnosis:
 
 
 def diagnose(
-    problem: TraceProblem,
-    model: SampleModel,
-    found: Fit,
-    *,
-    confidence: float,
-    noise_sd: float | None = None,
-    valley: bool = False,
+    problem: TraceProblem, found: Fit, *, confidence: float, valley: bool = False
 ) -> Diagnosis:
     """Judge the identification of one trace by profile likelihoods, as `diagnose_all` does."""
-    (diagnosis,) = diagnose_all(
-        [problem], model, [found], confidence=confidence, noise_sd=[noise_sd], valley=valley
-    )
-    return diagnosis
+    return diagnose_all([problem], [found], confidence=confidence, valley=valley)[0]
 
 
 def diagnose_all(
     problems: Sequence[TraceProblem],
-    model: SampleModel,
     found: Sequence[Fit],
     *,
     confidence: float,
-    noise_sd: Sequence[float | None],
     valley: bool = False,
 ) -> list[Diagnosis]:
-    """Judge the identification of each of several traces by profile likelihoods.
+    """Judge the identification of each of several traces, by one model, by profile likelihoods.
 
-    No diagnosis depends on the other traces. Found are their global optima, as far as is known; the
-    noise, if its standard deviation is not known, is that of the residual. Limits have a
+    No diagnosis depends on the other traces. Found are their global optima, as far as is known. The
+    noise of a trace, if its standard deviation is not known, is that of the residual. Limits have a
     confidence, e.g. 0.95. If `valley` is true, chi^2 is mapped over exchangeable parameters, too.
     """
 
     def profile(likelihoods: Sequence[Likelihood]) -> list[Diagnosis]:
+        model = problems[0].residuals.model
         every = compute_findings(likelihoods, parameters_and_sum(model))
-        trades = [find_trade_offs(*pair, model) for pair in zip(likelihoods, every, strict=True)]
+        trades = map(find_trade_offs, likelihoods, every)
         found = list(map(profiled, likelihoods, every, trades))
-        return [_with_valley(each, model) for each in found] if valley else found
+        return [_with_valley(each) for each in found] if valley else found
 
-    judged = settled(problems, found, profile, confidence=confidence, noise_sd=noise_sd)
-    return [_with_notes(each, remainder.find_notes(), model) for each, remainder in judged]
+    judged = settled(problems, found, profile, confidence=confidence)
+    return [_with_notes(each, find_notes()) for each, find_notes in judged]
 
 
 def settled(
@@ -173,8 +156,7 @@ def settled(
     profile: Callable[[Sequence[Likelihood]], list[Diagnosis]],
     *,
     confidence: float,
-    noise_sd: Sequence[float | None],
-) -> list[tuple[Diagnosis, Remainder]]:
+) -> list[tuple[Diagnosis, FindNotes]]:
     """Profile traces until no profile comes below a best fit.
 
     1. What each best fit leaves is examined: limits may have to allow for a misfit.
@@ -182,29 +164,27 @@ def settled(
     3. Where one of them comes below the best fit, the trace is fitted from its lowest point, and
        1 to 3 are repeated for this trace.
 
-    Returns diagnoses, without notes, and what 1 found. See `diagnose_all` for the parameters.
+    Returns diagnoses, without notes, and what finds those of 1. See `diagnose_all` for the
+    parameters.
     """
-    best, done = list(found), dict[int, tuple[Diagnosis, Remainder]]()
+    best, done = list(found), dict[int, tuple[Diagnosis, FindNotes]]()
     while left := [trace for trace in range(len(problems)) if trace not in done]:
-        likelihoods, remainders = [], []
+        examined = []
         for trace in left:
             likelihood = make_likelihood(
                 problems[trace],
                 np.log(best[trace].parameters),
                 best[trace].misfit,
                 confidence=confidence,
-                noise_sd=noise_sd[trace],
+                noise_sd=problems[trace].residuals.trace.known_noise,
             )
             check_rows(likelihood)
-            remainder = examine_residuals(likelihood)
-            if remainder.misfit is not None:
-                likelihood = likelihood.as_misfit(*remainder.misfit)
-            likelihoods.append(likelihood)
-            remainders.append(remainder)
-        for trace, judged, remainder in zip(left, profile(likelihoods), remainders, strict=True):
+            examined.append(examine_residuals(likelihood))
+        likelihoods, finders = zip(*examined, strict=True)
+        for trace, judged, find_notes in zip(left, profile(likelihoods), finders, strict=True):
             lower = _lower_fit(judged, best[trace])
             if lower is None:
-                done[trace] = replace(judged, converged=best[trace].converged), remainder
+                done[trace] = replace(judged, converged=best[trace].converged), find_notes
             else:
                 best[trace] = lower
     return [done[trace] for trace in range(len(problems))]
@@ -215,33 +195,34 @@ def _lower_fit(judged: Diagnosis, found: Fit) -> Fit | None:
     if judged.lowest is None:
         return None
     missed = found.at(fit_from([judged.likelihood.problem], judged.lowest))
-    return None if judged.likelihood.increase(missed.misfit) > -MISSED else missed
+    return None if judged.likelihood.increase(missed.misfit) > -levels.MISSED else missed
 
 
 def profiled(likelihood: Likelihood, findings: list[Finding], trades: list[Trade]) -> Diagnosis:
     """Return a diagnosis without notes, with the lowest point of its profiles."""
     every = [*findings, *(trade.finding for trade in trades)]
     lowest = min((finding.profile for finding in every), key=lambda p: float(p.increases.min()))
-    missed = lowest.lowest if lowest.increases.min() < -MISSED else None
+    missed = lowest.lowest if lowest.increases.min() < -levels.MISSED else None
     return Diagnosis(likelihood, findings, trades, lowest=missed)
 
 
-def _with_valley(judged: Diagnosis, model: SampleModel) -> Diagnosis:
+def _with_valley(judged: Diagnosis) -> Diagnosis:
     """Return a diagnosis with its valley, whose lowest point counts if no profile is lower."""
-    valley, missed = compute_valley(judged.likelihood, model)
+    valley, missed = compute_valley(judged.likelihood)
     return replace(judged, valley=valley, lowest=missed if judged.lowest is None else judged.lowest)
 
 
-def with_times(diagnoses: Sequence[Diagnosis], model: SampleModel) -> list[Diagnosis]:
+def with_times(diagnoses: Sequence[Diagnosis]) -> list[Diagnosis]:
     """Return diagnoses with findings on relaxation and retardation times after the others."""
-    if not (times := characteristic_times(model)):
+    likelihoods = [diagnosis.likelihood for diagnosis in diagnoses]
+    if not (times := characteristic_times(likelihoods[0].problem.residuals.model)):
         return [*diagnoses]
-    every = compute_findings([diagnosis.likelihood for diagnosis in diagnoses], times)
+    every = compute_findings(likelihoods, times)
     pairs = zip(diagnoses, every, strict=True)
     return [replace(own, findings=[*own.findings, *found]) for own, found in pairs]
 
 
-def _with_notes(judged: Diagnosis, of_rest: list[Note], model: SampleModel) -> Diagnosis:
+def _with_notes(judged: Diagnosis, of_rest: list[Note]) -> Diagnosis:
     """Return a diagnosis with the force of the jaws, and all notes: those on the rest, too."""
     likelihood, findings = judged.likelihood, judged.findings
     residuals = likelihood.problem.residuals
@@ -255,9 +236,9 @@ def _with_notes(judged: Diagnosis, of_rest: list[Note], model: SampleModel) -> D
         for finding in findings
         if finding.gaps
     ]
-    notes += [*_range_ends(likelihood, model), *of_rest]
+    notes += [*_range_ends(likelihood), *of_rest]
     # Limits that allow for rounding hold, however wide they are.
-    if not any(note.text.startswith(ROUNDED) for note in of_rest):
+    if not any(note.about == ROUNDED for note in of_rest):
         notes += _too_slow(judged)
     notes += _pulling(grip, residuals.duration_s)
     if not judged.converged:
@@ -281,10 +262,10 @@ def _too_slow(judged: Diagnosis) -> Iterator[Note]:
         )
 
 
-def _range_ends(likelihood: Likelihood, model: SampleModel) -> Iterator[Note]:
+def _range_ends(likelihood: Likelihood) -> Iterator[Note]:
     """Yield a note for each parameter that a wider range takes clearly beyond an end of its."""
     problem, x = likelihood.problem, likelihood.best
-    for index, parameter in enumerate(model.parameters):
+    for index, parameter in enumerate(problem.residuals.model.parameters):
         for end, outward, word in ((problem.low, -1.0, "lower"), (problem.high, 1.0, "upper")):
             # An exponent at its upper end is that of a damper: there is nothing beyond.
             bounded = outward > 0 and np.isfinite(parameter.below)
@@ -294,7 +275,7 @@ def _range_ends(likelihood: Likelihood, model: SampleModel) -> Iterator[Note]:
             start[index] += outward * _BEYOND
             (low if outward < 0 else high)[index] += outward * _WIDER
             wider = fit_from([replace(problem, low=low, high=high)], start, roughly=True)
-            if likelihood.increase(float(wider.misfit[0])) < -BEYOND_THE_RANGE:
+            if likelihood.increase(float(wider.misfit[0])) < -levels.BEYOND_THE_RANGE:
                 unit = f" {parameter.unit}" if parameter.unit else ""
                 yield Note(
                     REJECTION,
@@ -318,9 +299,10 @@ def _ringing(judged: Diagnosis, *, rejected: bool) -> Iterator[Note]:
     if ring := residuals.ring(network, noise_sd):
         yield Note(
             REJECTION if rejected else DOUBT,
-            f"{RING}: their inertia, which fits leave out, changes readings of this sample "
+            "The arms ring: their inertia, which fits leave out, changes readings of this sample "
             f"by up to {plain(ring.largest, 2)} times the noise. Leave out the readings of the "
             f"first {_rounded_up(1e3 * ring.lasts_s)} ms after each change of the torque.",
+            RING,
         )
 
 

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 
 import numpy as np
+from scipy.special import chdtr, chdtrc
 
 from biogrip.arrays import Array, BoolArray
 from biogrip.digits import counted, p_value, plain
@@ -29,22 +30,8 @@ from biogrip.fit.noise_model_fit import (
     compute_growth,
     outliers_of,
 )
-from biogrip.judging import levels
+from biogrip.judging import levels, whiteness
 from biogrip.judging.likelihood import Likelihood
-from biogrip.judging.whiteness import (
-    Step,
-    about_moduli,
-    as_correlated,
-    by_leverage,
-    compare_halves,
-    correlated,
-    far_out,
-    find_inertia,
-    find_line,
-    find_step,
-    uneven,
-    wandering,
-)
 from biogrip.physics.noise import MOST_SAMPLES, ROOT_12, NoiseModel, estimate_noise, without
 from biogrip.physics.residuals import Residuals
 
@@ -54,8 +41,8 @@ HARMLESS, DOUBT, REJECTION = "harmless", "doubt", "rejection"
 OK, DOUBTFUL, REJECTED = "ok", "doubtful", "rejected"
 """Status of a fit by the heaviest of its notes."""
 
-ROUNDED = "The readings are rounded"
-"""Beginning of the note on errors of rounding."""
+ROUNDED, RING = "rounded", "ring"
+"""What notes are about that others depend on."""
 
 _STATUS = {HARMLESS: OK, DOUBT: DOUBTFUL, REJECTION: REJECTED}
 _WEIGHTS = tuple(_STATUS)
@@ -69,6 +56,8 @@ class Note:
     """`HARMLESS`: the results hold. `DOUBT`: they may not. `REJECTION`: they do not."""
     text: str
     """The sentence."""
+    about: str = ""
+    """`ROUNDED` or `RING`, if it is about that."""
 
 
 def compute_status(notes: Sequence[Note]) -> str:
@@ -94,14 +83,8 @@ MANY = 100_000
 _NAMED, _MOST_LINES = 5, 3
 
 
-@dataclass(frozen=True)
-class Remainder:
-    """What a fit leaves."""
-
-    find_notes: Callable[[], list[Note]] = list
-    """Function that tests it: doubts about it and about the noise that was given."""
-    misfit: tuple[float, float] | None = None
-    """If limits allow for a misfit, its worth in independent residuals and its freedom."""
+FindNotes = Callable[[], list[Note]]
+"""Function that tests what a fit leaves: doubts about it and about the noise that was given."""
 
 
 @dataclass(frozen=True)
@@ -128,22 +111,45 @@ class _Left:
     @cached_property
     def correlation(self) -> tuple[float, float]:
         """Correlation of neighbours, and its chance."""
-        return correlated(self.bulk, self.basis)
+        return whiteness.correlated(self.bulk, self.basis)
 
     @cached_property
     def lines(self) -> list[str]:
-        """Sentences on lines in the spectrum; outliers have all frequencies, and sweeps none."""
+        """Sentence on lines in the spectrum, if there is no other misfit.
+
+        Outliers have all frequencies, and sweeps none.
+        """
         residuals = self.likelihood.problem.residuals
         if residuals.course.sweeps or self.struck.any():
             return []
-        return list(_lines(self.bulk, self.basis, residuals, self.scale))
+        rest, taken, named = self.bulk, self.basis, list[str]()
+        unit, slowest = f" {residuals.instrument.read.unit}".rstrip(), np.inf
+        while len(named) < _MOST_LINES:
+            frequency, chance, line = whiteness.find_line(rest, residuals.trace.time_s)
+            if chance >= levels.FALSE_ALARM:
+                break
+            amplitude = float(np.linalg.norm(line @ rest)) * np.sqrt(2 / len(rest))
+            named.append(f"{plain(frequency, 3)} Hz ({plain(amplitude, 2)}{unit})")
+            slowest = min(slowest, frequency)
+            taken = absorbed(np.vstack((taken, line)))
+            rest = without(taken, self.bulk)
+        large = float(np.sqrt(np.mean(rest**2))) > levels.TOO_MUCH * self.scale
+        if not named or (large and whiteness.correlated(rest, taken)[1] < levels.CERTAIN_MISFIT):
+            return []
+        return [
+            f"The residual has a line in its spectrum, at {' and '.join(named)}, as of hum or a "
+            f"vibration. Filter it out, or average the readings over {plain(1 / slowest, 3)} s."
+        ]
 
 
-def examine_residuals(likelihood: Likelihood) -> Remainder:
-    """Tell what the best fit of a trace leaves: noise, or misfit."""
+def examine_residuals(likelihood: Likelihood) -> tuple[Likelihood, FindNotes]:
+    """Tell what the best fit of a trace leaves: noise, or misfit, for which limits may allow.
+
+    Returns the likelihood that these limits have, and what finds the notes.
+    """
     residuals, misfit = likelihood.problem.residuals, likelihood.misfit
     if misfit < levels.UNRESOLVED * residuals.peak:
-        return Remainder()
+        return likelihood, list
     if residuals.samples > MANY:
         residual, slopes = residuals.left(likelihood.best), np.zeros((0, residuals.samples))
     else:
@@ -151,7 +157,7 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
     rounding = residuals.trace.rounding
     least = min(levels.NOISE_FREE * likelihood.noise_sd, levels.NOISE_FREE_OF_PEAK * residuals.peak)
     if misfit < least and estimate_noise(residual, rounding) < levels.NO_SCATTER * misfit:
-        return Remainder()
+        return likelihood, list
     growth = compute_growth(residual, residuals.response(likelihood.best), rounding)
     directions = np.vstack((slopes, residuals.trace.condensed.nuisance)) if len(slopes) else slopes
     basis = absorbed(directions / growth)
@@ -159,8 +165,8 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
     if np.ptp(growth):
         # What a fit with these weights would leave, to first order.
         standard = without(basis, standard)
-    struck = outliers_of(by_leverage(standard, basis), rounding)
-    if far_out(standard, struck, basis) >= levels.FALSE_ALARM:
+    struck = outliers_of(whiteness.by_leverage(standard, basis), rounding)
+    if whiteness.far_out(standard, struck, basis) >= levels.FALSE_ALARM:
         struck[:] = False
     # Outliers are noise of the recording: they make a fit doubtful, not wrong.
     basis = absorbed(basis[:, ~struck]) if struck.any() else basis
@@ -169,7 +175,7 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
         scale = max(scale, estimate_noise(standard, rounding))
     left = _Left(likelihood, growth, struck, standard[~struck], basis, scale)
     certain = left.correlation[1] < levels.CERTAIN_MISFIT and left.times > levels.TOO_MUCH
-    found, worth = None, None
+    found, worth, find_notes = None, None, _find_notes
     if certain and not left.lines:
         found, worth = _misfit(left, residual, slopes)
     small = misfit <= levels.TOO_MUCH * rounding / ROOT_12 and np.max(np.abs(residual)) <= rounding
@@ -179,8 +185,8 @@ def examine_residuals(likelihood: Likelihood) -> Remainder:
         _, counts = np.unique(residuals.trace.readings, return_counts=True)
         share = min(misfit * ROOT_12 / rounding, 1.0) ** 2
         worth = share * residuals.samples**2 / float(np.sum(counts**2)), residuals.samples
-        return Remainder(partial(_find_notes_of_rounding, left, found), worth)
-    return Remainder(partial(_find_notes, left, found), worth)
+        find_notes = _find_notes_of_rounding
+    return likelihood.as_misfit(*worth) if worth else likelihood, partial(find_notes, left, found)
 
 
 def _find_notes(left: _Left, misfit: Note | None = None) -> list[Note]:
@@ -196,10 +202,7 @@ def _find_notes(left: _Left, misfit: Note | None = None) -> list[Note]:
         if compute_status(notes) == DOUBTFUL:
             # With the wrong noise or unit, nothing else is known.
             return notes
-    doubts = [
-        *_about_growth(left.growth, left.scale, residuals, likelihood.best),
-        *_about_outliers(residuals, struck),
-    ]
+    doubts = [*_about_growth(left), *_about_outliers(residuals, struck)]
     in_time = not residuals.course.sweeps
     # Outliers distort a fit, so that all that it leaves is correlated.
     if not left.struck.any():
@@ -226,11 +229,11 @@ def _find_notes_of_rounding(left: _Left, misfit: Note | None = None) -> list[Not
     residuals = left.likelihood.problem.residuals
     size = f"{plain(residuals.trace.rounding, 2)} {residuals.instrument.read.unit}".rstrip()
     text = (
-        f"{ROUNDED} to steps of {size}, more than their noise, or are cut off there. The limits "
-        "allow for one error wherever a reading is the same."
+        f"The readings are rounded to steps of {size}, more than their noise, or are cut off "
+        "there. The limits allow for one error wherever a reading is the same."
     )
     status = compute_status(_find_notes(left, misfit))
-    return [Note(HARMLESS if status == OK else DOUBT, text)]
+    return [Note(HARMLESS if status == OK else DOUBT, text, ROUNDED)]
 
 
 def _misfit(left: _Left, residual: Array, slopes: Array) -> tuple[Note, tuple[float, float] | None]:
@@ -261,7 +264,7 @@ def _misfit(left: _Left, residual: Array, slopes: Array) -> tuple[Note, tuple[fl
     else:
         text = f"The misfit is {more} times the noise of the trace, and {of_peak}: {suspects}."
         return Note(REJECTION, text), None
-    misfit = as_correlated(left.bulk, left.basis)
+    misfit = whiteness.as_correlated(left.bulk, left.basis)
     if misfit[0] < 1:
         slow = "broad as the sweep" if residuals.course.sweeps else "slow as the trace"
         text += f" It is as {slow}, which the limits allow for."
@@ -278,10 +281,11 @@ def name_suspects(residuals: Residuals, times: float, scale: float) -> str:
     least = plain(other, 2)
     gives, culprits = "gives this trace under this protocol", "load, clock, contact or drift"
     if residuals.course.sweeps:
-        gives, culprits = "has both moduli (Kramers-Kronig)", find_inertia(residuals, *left)
+        gives = "has both moduli (Kramers-Kronig)"
+        _, culprits = whiteness.find_inertia(residuals, *left)
     noises = counted(least, "noise")
     inadequate = f"the model is not adequate, as a linear sample of another kind fits to {noises}"
-    if correlated(*left)[1] >= levels.FALSE_ALARM:
+    if whiteness.correlated(*left)[1] >= levels.FALSE_ALARM:
         if other > levels.TOO_MUCH and times < other * levels.TOO_MUCH:
             return f"single readings are far off, as no linear sample leaves less than {noises}"
         return inadequate
@@ -291,12 +295,10 @@ def name_suspects(residuals: Residuals, times: float, scale: float) -> str:
     return f"no linear sample {gives}; {nearest}: {culprits}"
 
 
-def _about_growth(
-    growth: Array, scale: float, residuals: Residuals, log_parameters: Array
-) -> Iterator[str]:
-    """Yield a sentence on noise that grows with what is read, (n_samples,) in units of a scale."""
-    times = compare_extremes(growth)
-    if not np.ptp(growth) or times < levels.TOO_MUCH:
+def _about_growth(left: _Left) -> Iterator[str]:
+    """Yield a sentence on noise that grows with what is read."""
+    times, residuals = compare_extremes(left.growth), left.likelihood.problem.residuals
+    if times < levels.TOO_MUCH:
         return
     instrument = residuals.instrument
     read = instrument.read.name
@@ -308,7 +310,7 @@ def _about_growth(
     )
     # Of noise that grows little the share is hardly known.
     if not residuals.coloured and times > levels.CLEARLY:
-        share = scale * growth / np.abs(residuals.response(log_parameters))
+        share = left.scale * left.growth / np.abs(residuals.response(left.likelihood.best))
         text += f" Readings are weighted by --noise-share {plain(np.median(share), 2)}."
     yield text
 
@@ -322,12 +324,12 @@ def _about_colour(left: _Left) -> Iterator[str]:
             f"Neighbouring residuals are correlated ({correlation:.2f}; white noise would give "
             f"0 ± {1 / np.sqrt(len(residual)):.2f}): the intervals are too narrow, or {suspects()}."
         )
-    elif (chance := uneven(residual, basis)) < levels.FALSE_ALARM:
+    elif (chance := whiteness.uneven(residual, basis)) < levels.FALSE_ALARM:
         yield (
             "The residual has more of some frequencies than of others, unlike white noise "
             f"({p_value(chance)}): the intervals are wrong, or {suspects()}."
         )
-    chance = wandering(residual, basis)
+    chance = whiteness.wandering(residual, basis)
     if chance < levels.FALSE_ALARM:
         yield (
             "The residual wanders: its means over stretches of the trace scatter more than those "
@@ -336,37 +338,13 @@ def _about_colour(left: _Left) -> Iterator[str]:
         )
 
 
-def _lines(residual: Array, basis: Array, residuals: Residuals, scale: float) -> Iterator[str]:
-    """Yield a sentence on lines in the spectrum of residuals, if these have no other misfit."""
-    rest, taken, named = residual, basis, list[str]()
-    unit, slowest = f" {residuals.instrument.read.unit}".rstrip(), np.inf
-    while len(named) < _MOST_LINES:
-        frequency, chance, line = find_line(rest, residuals.trace.time_s)
-        if chance >= levels.FALSE_ALARM:
-            break
-        amplitude = float(np.linalg.norm(line @ rest)) * np.sqrt(2 / len(rest))
-        named.append(f"{plain(frequency, 3)} Hz ({plain(amplitude, 2)}{unit})")
-        slowest = min(slowest, frequency)
-        taken = absorbed(np.vstack((taken, line)))
-        rest = without(taken, residual)
-    size = float(np.sqrt(np.mean(rest**2)))
-    misfit = correlated(rest, taken)[1] < levels.CERTAIN_MISFIT and size > levels.TOO_MUCH * scale
-    if named and not misfit:
-        yield (
-            f"The residual has a line in its spectrum, at {' and '.join(named)}, as of hum or a "
-            f"vibration. Filter it out, or average the readings over {plain(1 / slowest, 3)} s."
-        )
-
-
 def _about_changes(left: _Left, *, coloured: bool) -> list[str]:
     """Return a sentence on a change within the trace, if it explains what its fit leaves."""
     residuals, residual, basis = left.likelihood.problem.residuals, left.bulk, left.basis
     trace, growth = residuals.trace, left.growth
     if residuals.course.sweeps:
-        return [] if coloured else list(about_moduli(residuals, residual, basis, growth))
-    cleared = trace.condensed.cleared
-    weighted = (lambda rows: cleared(rows) / growth) if np.ptp(growth) else cleared
-    step = find_step(residual, basis, weighted)
+        return [] if coloured else list(whiteness.about_moduli(residuals, residual, basis, growth))
+    step = whiteness.find_step(residual, basis, lambda it: trace.condensed.cleared(it) / growth)
     if step and step.chance < levels.FALSE_ALARM and not (coloured and _is_coloured(step)):
         before_s, after_s = trace.time_s[step.before - 1 : step.before + 1]
         size = plain(-step.size, 2)
@@ -377,7 +355,7 @@ def _about_changes(left: _Left, *, coloured: bool) -> list[str]:
             "far off. Leave out what is before or after (--from, --until)."
         ]
     split = middle_of(residuals)
-    chance = 1.0 if coloured else compare_halves(residual, basis, split)
+    chance = 1.0 if coloured else whiteness.compare_halves(residual, basis, split)
     if chance >= levels.FALSE_ALARM:
         return []
     return [
@@ -387,10 +365,10 @@ def _about_changes(left: _Left, *, coloured: bool) -> list[str]:
     ]
 
 
-def _is_coloured(step: Step) -> bool:
+def _is_coloured(step: whiteness.Step) -> bool:
     """Return True if what a fit leaves with a step is not white noise, either."""
     given = step.left, step.basis
-    chances = correlated(*given)[1], uneven(*given), wandering(*given)
+    chances = whiteness.correlated(*given)[1], whiteness.uneven(*given), whiteness.wandering(*given)
     return min(chances) < levels.FALSE_ALARM
 
 
@@ -422,8 +400,6 @@ def _about_outliers(residuals: Residuals, struck: BoolArray) -> Iterator[str]:
 
 def _about_given(likelihood: Likelihood, residual: Array) -> Iterator[Note]:
     """Yield a note if the noise that was given is refuted by residuals, in a chi-squared test."""
-    from scipy.special import chdtr, chdtrc
-
     if likelihood.freedom < np.inf:
         return
     residuals = likelihood.problem.residuals

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import chdtri
 
 from biogrip.arrays import Array
 from biogrip.digits import plain
@@ -19,7 +20,7 @@ from biogrip.fit.noise_model_fit import absorbed
 from biogrip.judging import levels
 from biogrip.judging.doubts import MANY, middle_of
 from biogrip.judging.likelihood import Likelihood
-from biogrip.judging.verdicts import Finding
+from biogrip.judging.verdicts import DETERMINED, Finding
 from biogrip.judging.whiteness import averaged, parts_apart, steps_of
 from biogrip.physics.noise import without
 from biogrip.physics.simulation import simulated_response
@@ -53,10 +54,8 @@ class Hidden:
 
 def find_hidden(likelihood: Likelihood, findings: Sequence[Finding]) -> list[Hidden]:
     """Return the worst error of each kind that moves a quantity with two limits, none of `MANY`."""
-    from scipy.special import chdtri
-
     residuals, best = likelihood.problem.residuals, likelihood.best
-    limited = [each for each in findings if each.low is not None and each.high is not None]
+    limited = [each for each in findings if each.verdict == DETERMINED]
     if residuals.samples > MANY or not limited:
         return []
     _, slopes = residuals(best)
@@ -70,6 +69,12 @@ def find_hidden(likelihood: Likelihood, findings: Sequence[Finding]) -> list[Hid
         if len(rows)
     ]
     critical = steps.critical(levels.FALSE_ALARM)
+    # How far the nearer limit of each is.
+    room = dict[str, float]()
+    for each in limited:
+        profile = each.profile
+        nearer = min(abs((end or 0.0) - profile.best) for end in (profile.low, profile.high))
+        room[each.quantity.label] = max(nearer, 1e-12)
     information = slopes @ slopes.T / likelihood.noise_sd**2 + np.eye(len(slopes))
     worst: dict[str, Hidden] = {}
     for kind, words, unit, most_size, shape in _planted(likelihood):
@@ -81,21 +86,13 @@ def find_hidden(likelihood: Likelihood, findings: Sequence[Finding]) -> list[Hid
         of_one = [float(each.quantity.gradient(best) @ moved) for each in limited]
         twofold = max(map(abs, of_one)) / np.log(2)
         size = 1 / max(told, 1 / most_size, twofold)
-        labels = [each.quantity.label for each in limited]
-        moves = {label: size * by for label, by in zip(labels, of_one, strict=True)}
-        ratios = {each.quantity.label: _beyond(each, moves) for each in limited}
-        most = max(ratios, key=lambda label: ratios[label])
-        found = Hidden(words.format(plain(size * unit, 2)), moves, (most, ratios[most]))
-        if kind not in worst or found.beyond[1] > worst[kind].beyond[1]:
+        moves = {label: size * by for label, by in zip(room, of_one, strict=True)}
+        most = max(room, key=lambda label: abs(moves[label]) / room[label])
+        beyond = most, abs(moves[most]) / room[most]
+        found = Hidden(words.format(plain(size * unit, 2)), moves, beyond)
+        if kind not in worst or beyond[1] > worst[kind].beyond[1]:
             worst[kind] = found
     return sorted(worst.values(), key=lambda each: -each.beyond[1])
-
-
-def _beyond(finding: Finding, moves: dict[str, float]) -> float:
-    """Return a move over the distance of the nearer limit."""
-    profile = finding.profile
-    low, high = (abs((end or 0.0) - profile.best) for end in (profile.low, profile.high))
-    return abs(moves[finding.quantity.label]) / max(min(low, high), 1e-12)
 
 
 def _planted(likelihood: Likelihood) -> Iterator[tuple[str, str, float, float, Array]]:

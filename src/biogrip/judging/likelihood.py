@@ -26,7 +26,7 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.problem import TraceProblem
-from biogrip.judging.levels import CERTAIN, DETERMINED_PERCENT, MISSED
+from biogrip.judging import levels
 from biogrip.judging.quantities import Quantity, parameters_and_sum
 from biogrip.physics.modes import linear_responses
 from biogrip.physics.noise import Noise, standard_deviation
@@ -128,7 +128,7 @@ def check_rows(likelihood: Likelihood) -> None:
     largest = max(float(np.max(np.abs(each))) for each in both)
     rounding = _ROUNDING * residuals.samples * (largest / likelihood.noise_sd) ** 2
     apart = likelihood.increase(of_rows) - likelihood.increase(of_readings)
-    if abs(apart) > MISSED + rounding:
+    if abs(apart) > levels.MISSED + rounding:
         text = f"rows with a misfit of {of_rows:.6g} stand for readings with {of_readings:.6g}"
         raise ArithmeticError(text)
 
@@ -137,11 +137,11 @@ def find_thresholds(confidence: float, freedom: float) -> tuple[float, float]:
     """Return increases of chi^2 at limits and at `CERTAIN`: chi-squared(1), or F(1, freedom)."""
     from scipy.special import fdtri
 
-    levels = confidence, CERTAIN
+    both = confidence, levels.CERTAIN
     if freedom == inf:
-        at_limits, certain = (NormalDist().inv_cdf((1 + level) / 2) ** 2 for level in levels)
+        at_limits, certain = (NormalDist().inv_cdf((1 + level) / 2) ** 2 for level in both)
     else:
-        at_limits, certain = (float(fdtri(1, freedom, level)) for level in levels)
+        at_limits, certain = (float(fdtri(1, freedom, level)) for level in both)
     return at_limits, certain
 
 
@@ -248,6 +248,8 @@ def headlines(bounds: Sequence[tuple[str, float]]) -> list[str]:
     medians = sorted((float(np.median(found)), label) for label, found in percents.items())
     parts = {part for label in percents if " + " in label for part in label.split(" + ")}
     determined = [
-        label for percent, label in medians if percent < DETERMINED_PERCENT and label not in parts
+        label
+        for percent, label in medians
+        if percent < levels.DETERMINED_PERCENT and label not in parts
     ]
     return determined[:1] + determined[1:][-1:]

@@ -30,8 +30,8 @@ from biogrip.fit.least_squares import LeastSquaresSettings, fit_from, identify_m
 from biogrip.fit.noise_model_fit import absorbed
 from biogrip.fit.problem import TraceProblem, silent
 from biogrip.judging import levels
-from biogrip.judging.diagnosis import RING, Diagnosis
-from biogrip.judging.doubts import DOUBT, HARMLESS, MANY, REJECTED, REJECTION, Note
+from biogrip.judging.diagnosis import Diagnosis
+from biogrip.judging.doubts import DOUBT, HARMLESS, MANY, REJECTED, REJECTION, RING, Note
 from biogrip.judging.likelihood import Likelihood, compute_fall, make_likelihood
 from biogrip.judging.profiles import Profile, compute_profiles
 from biogrip.judging.verdicts import Finding
@@ -492,15 +492,15 @@ def _longest_ramp(
         return None
     earlier_s = _EARLIER * spacing_at(fits.time_s, 0.0)
     earlier = fits.at(-earlier_s, given.log_parameters).log_parameters
-    lengths = {}
+    lengths = []
     for each in diagnosis.findings:
         if each.low and each.high:
             value, moved = (each.quantity.log(x) for x in (given.log_parameters, earlier))
             room = min(abs(np.log(end) - value) for end in (each.low, each.high))
-            lengths[each.quantity.label] = 2 * earlier_s * room / max(abs(moved - value), 1e-12)
-    label = min(lengths, key=lambda label: lengths[label], default="")
-    short = label and lengths[label] < levels.SHORT_RAMP * fits.time_s[-1]
-    return (lengths[label], label) if short else None
+            length_s = 2 * earlier_s * room / max(abs(moved - value), 1e-12)
+            lengths.append((length_s, each.quantity.label))
+    shortest = min(lengths, default=(np.inf, ""))
+    return shortest if shortest[0] < levels.SHORT_RAMP * fits.time_s[-1] else None
 
 
 def _with_ramp(experiment: Experiment, time_s: Array) -> Experiment | None:
@@ -529,20 +529,19 @@ def onset_limits(best: Likelihood, time_s: Array) -> tuple[float, float]:
     return _end(best, -step_s), _end(best, step_s)
 
 
-def profile_over_onset(
-    diagnosis: Diagnosis, time_s: Array
-) -> tuple[Diagnosis, tuple[float, float]]:
-    """Return a diagnosis whose limits allow for the onset, with times from it; and its limits."""
+def profile_over_onset(diagnosis: Diagnosis, time_s: Array) -> Diagnosis:
+    """Return a diagnosis whose limits allow for the onset, with times from it, and its limits."""
     best = diagnosis.likelihood
     ends = onset_limits(best, time_s)
+    diagnosis = replace(diagnosis, onset_limits_s=ends)
     if ends[1] - ends[0] > levels.KNOWN_START * spacing_at(time_s, 0.0):
         # Nothing tells how soon after a change of the torque a reading came.
-        notes = [note for note in diagnosis.notes if not note.text.startswith(RING)]
+        notes = [note for note in diagnosis.notes if note.about != RING]
         diagnosis = replace(diagnosis, notes=notes)
     others = [_at(best, float(change_s)) for end in ends for change_s in end * _SHARES]
     others = [each for each in others if each.threshold > 0]
     if not others:
-        return diagnosis, ends
+        return diagnosis
     found = [*diagnosis.findings, *(trade.finding for trade in diagnosis.trades)]
     every = compute_profiles(others, [finding.quantity for finding in found], smooth=False)
     costs = [best.threshold - each.threshold for each in others]
@@ -551,7 +550,7 @@ def profile_over_onset(
     kept = len(diagnosis.findings)
     pairs = zip(diagnosis.trades, merged[kept:], strict=True)
     trades = [replace(trade, finding=finding) for trade, finding in pairs]
-    return replace(diagnosis, findings=merged[:kept], trades=trades), ends
+    return replace(diagnosis, findings=merged[:kept], trades=trades)
 
 
 def _at(best: Likelihood, change_s: float) -> Likelihood:

@@ -28,11 +28,10 @@ import numpy as np
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.digits import round_increase, rounded
 from biogrip.fit.least_squares import FAIR, FINE, alike
+from biogrip.judging import levels
 from biogrip.judging.constrained_fits import CLOSE, ConstrainedFits
-from biogrip.judging.levels import MISSED
 from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.quantities import Quantity
-from biogrip.physics.sample_model import SampleModel
 
 HIGHEST = 16.0
 """Increase of chi^2 up to which a profile has dense points, as figures show no more."""
@@ -208,7 +207,6 @@ def _profiles(fits: ConstrainedFits, *, smooth: bool) -> list[Profile]:
     for index, ends in enumerate(limits.tolist()):
         own = points.profile == index
         values, increases, x = points.values[own], points.increases[own], points.x[own]
-        low, high = (None if np.isnan(end) else end for end in ends)
         gaps = find_gaps(values, increases, float(fits.threshold[index]))
         lowest = x[int(np.argmin(increases))]
         short = (increases[[0, -1]] > fits.threshold[index]) & np.isnan(ends)
@@ -220,7 +218,7 @@ def _profiles(fits: ConstrainedFits, *, smooth: bool) -> list[Profile]:
         problem = fits.likelihoods[fits.trace[index]].problem
         quantity = fits.quantities[index % len(fits.quantities)]
         made = values[quantity.at_end(x, problem.low, problem.high, values > best)]
-        low, high = (None if end in made else end for end in (low, high))
+        low, high = (None if np.isnan(end) or end in made else end for end in ends)
         if slowest_s is not None:
             low, high, gaps, certainty = None, None, (), None
         found.append(
@@ -253,10 +251,9 @@ def _limits(points: Points) -> Array:
         both = np.stack((inside, outside))
         values, increases, x = points.values[both], points.increases[both], points.x[both]
         elsewhere = points.extremes()[:, fits.trace[profile]]
-        brackets = Brackets(profile, values, increases, x, elsewhere)
-        found = crossings(fits, brackets)
+        found = crossings(fits, profile, values, increases, x, elsewhere)
         crossed[end, profile] = found
-        points.increases[both], points.x[both] = brackets.increases, brackets.x
+        points.increases[both], points.x[both] = increases, x
         # Where the outer point has come below the threshold, the next bracket is further out.
         on = np.isnan(found) & (outside != ends[end, profile])
         end, profile = end[on], profile[on]
@@ -267,32 +264,26 @@ def _limits(points: Points) -> Array:
 _MOST_FITS, _CLOSEST = 40, 1e-7
 
 
-@dataclass
-class Brackets:
-    """Intervals in which n profiles cross their thresholds, each with an inner and an outer end."""
-
-    profile: IntArray
-    """Index of the profile in `ConstrainedFits`, (n,)."""
-    values: Array
-    """Logarithms at the inner end, below the threshold, and the outer, above it, (2, n)."""
-    increases: Array
-    """Increases of chi^2 there, (2, n)."""
-    x: Array
-    """Log-parameters fitted there, (2, n, n_parameters)."""
-    elsewhere: Array
-    """Starts that may lead to deeper basins, (n_starts, n, n_parameters)."""
-
-
-def crossings(fits: ConstrainedFits, brackets: Brackets) -> Array:
+def crossings(
+    fits: ConstrainedFits,
+    profile: IntArray,
+    values: Array,
+    increases: Array,
+    x: Array,
+    elsewhere: Array,
+) -> Array:
     """Find the logarithms of quantities at which the increase of chi^2 equals the threshold, (n,).
 
-    Lower fits that are found at outer ends of brackets replace theirs, in place. NaN is where a
-    deeper basin is below the threshold there, so that the crossing lies further out.
+    Each is between an inner end, below the threshold, and an outer, above it. Of these there are
+    the logarithms `values` and the `increases`, (2, n), and the fits `x`, (2, n, n_parameters).
+    Starts from `elsewhere`, (n_starts, n, n_parameters), may lead to deeper basins. Lower fits that
+    are found at outer ends replace theirs, in place. NaN is where a deeper basin is below the
+    threshold there, so that the crossing lies further out.
     """
-    profile, threshold = brackets.profile, fits.threshold[brackets.profile]
+    threshold = fits.threshold[profile]
     root_threshold = np.sqrt(threshold)
-    ends, x = brackets.values.copy(), brackets.x.copy()
-    excess = np.sqrt(np.maximum(brackets.increases, 0.0)) - root_threshold
+    ends, near = values.copy(), x.copy()
+    excess = np.sqrt(np.maximum(increases, 0.0)) - root_threshold
     moved = np.full(len(profile), -1)
     found = ends[1].copy()
     left = np.arange(len(profile))
@@ -302,21 +293,24 @@ def crossings(fits: ConstrainedFits, brackets: Brackets) -> Array:
         share = excess[0, left] / (excess[0, left] - excess[1, left])
         tried = ends[0, left] + share * (ends[1, left] - ends[0, left])
         # The fits of the two ends may lie in different basins: the deeper one counts.
-        between = x[0, left] + share[:, None] * (x[1, left] - x[0, left])
-        starts = np.concatenate((between[None], x[:, left]))
+        between = near[0, left] + share[:, None] * (near[1, left] - near[0, left])
+        starts = np.concatenate((between[None], near[:, left]))
         # In the first round, the best fit from elsewhere is one more start.
         if not tries:
-            _, deepest = fits.from_each(profile, tried, brackets.elsewhere, FAIR)
+            _, deepest = fits.from_each(profile, tried, elsewhere, FAIR)
             starts = np.concatenate((starts, deepest[None]))
-        increases, fitted = fits.from_each(profile[left], tried, starts, FINE)
-        over = np.sqrt(np.maximum(np.min(increases, axis=0), 0.0)) - root_threshold[left]
+        reached, fitted = fits.from_each(profile[left], tried, starts, FINE)
+        over = np.sqrt(np.maximum(np.min(reached, axis=0), 0.0)) - root_threshold[left]
         # A basin deeper than that of the outer end may be deeper at the outer end, too.
-        missed = np.sqrt(np.maximum(increases[2], 0.0)) - root_threshold[left] > over + _ACCURACY
-        _lower(fits, brackets, left[missed], fitted[missed])
-        void = brackets.increases[1, left] < threshold[left]
+        missed = np.sqrt(np.maximum(reached[2], 0.0)) - root_threshold[left] > over + _ACCURACY
+        if np.any(missed):
+            outer = left[missed]
+            beyond = fits.at(profile[outer], values[1, outer], fitted[missed], FINE)
+            keep_lower(increases[1], x[1], outer, *beyond)
+        void = increases[1, left] < threshold[left]
         found[left] = np.where(void, np.nan, tried)
         side = (over > 0).astype(np.int64)
-        ends[side, left], excess[side, left], x[side, left] = tried, over, fitted
+        ends[side, left], excess[side, left], near[side, left] = tried, over, fitted
         # The excess of an end that stays a second time is halved, so that the end moves, too.
         again = moved[left] == side
         excess[1 - side[again], left[again]] *= 0.5
@@ -325,15 +319,6 @@ def crossings(fits: ConstrainedFits, brackets: Brackets) -> Array:
         apart = np.abs(ends[1, left] - ends[0, left]) > _CLOSEST
         left = left[(np.abs(over) > _ACCURACY) & apart & ~void]
     return found
-
-
-def _lower(fits: ConstrainedFits, brackets: Brackets, which: IntArray, starts: Array) -> None:
-    """Fit the outer ends of brackets from other starts and keep, in place, the lower fits."""
-    if not len(which):
-        return
-    increases, x = fits.at(brackets.profile[which], brackets.values[1, which], starts, FINE)
-    lower = increases < brackets.increases[1, which]
-    brackets.increases[1, which[lower]], brackets.x[1, which[lower]] = increases[lower], x[lower]
 
 
 def find_gaps(
@@ -361,9 +346,7 @@ _FIRSTS = np.concatenate((np.arange(0.002, 0.1, 0.005), np.linspace(0.11, 1.2, 1
 _SECONDS = np.concatenate((np.arange(0.9, 1.06, 0.005), [1.08, 1.12, 1.2]))
 
 
-def compute_valley(
-    likelihood: Likelihood, model: SampleModel
-) -> tuple[dict[str, Any] | None, Array | None]:
+def compute_valley(likelihood: Likelihood) -> tuple[dict[str, Any] | None, Array | None]:
     """Compute the increase of chi^2 over two exchangeable parameters, with the others fitted.
 
     The first returned has ``x`` and ``y``, names and units; ``best``; and ``grids``, along the
@@ -371,6 +354,7 @@ def compute_valley(
     ``increases``. It is None unless just two, among others, were searched. The second is a missed
     optimum, or None.
     """
+    model = likelihood.problem.residuals.model
     pair = [index for index, p in enumerate(model.parameters) if p.name in model.exchangeable]
     if len(pair) != 2 or len(model.parameters) == 2:
         return None, None
@@ -419,5 +403,5 @@ def _increases(
         start[:, pair] = x[points][:, pair]
         tolerance = CLOSE
     lowest = int(np.argmin(increases))
-    missed = x[lowest] if increases[lowest] < -MISSED else None
+    missed = x[lowest] if increases[lowest] < -levels.MISSED else None
     return increases.reshape(rows, columns), missed

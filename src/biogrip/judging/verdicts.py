@@ -13,11 +13,10 @@ from itertools import combinations
 
 from biogrip.arrays import Array
 from biogrip.digits import plain, with_limits, within_limits
-from biogrip.judging.levels import WIDE, WORTH_A_PROFILE
+from biogrip.judging import levels
 from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.profiles import Profile, compute_profiles
 from biogrip.judging.quantities import Quantity, find_combinations
-from biogrip.physics.sample_model import SampleModel
 
 DETERMINED = "determined"
 BOUNDED_BELOW = "bounded below"
@@ -78,7 +77,7 @@ class Finding:
     def is_wide(self) -> bool:
         """True if its two limits tell little more than an order of magnitude: see `WIDE`."""
         low, high = self.low, self.high
-        return low is not None and high is not None and high > WIDE**2 * low
+        return low is not None and high is not None and high > levels.WIDE**2 * low
 
     def allows(self, log_parameters: Array) -> bool:
         """Return True if parameters, (n_parameters,), lie within the limits; NaN does."""
@@ -121,11 +120,6 @@ class Finding:
         )
 
     @property
-    def best_in_words(self) -> str:
-        """Best estimate with its unit."""
-        return f"{plain(self.value)}{self._unit}"
-
-    @property
     def _unit(self) -> str:
         return f" {self.quantity.unit}" if self.quantity.unit else ""
 
@@ -160,15 +154,13 @@ def compute_findings(
     return found
 
 
-def find_trade_offs(
-    likelihood: Likelihood, findings: Sequence[Finding], model: SampleModel
-) -> list[Trade]:
+def find_trade_offs(likelihood: Likelihood, findings: Sequence[Finding]) -> list[Trade]:
     """Find determined combinations of undetermined parameters.
 
     Combinations among the findings come first. Of other pairs, the combination known best to first
     order is profiled, if it is worth a look.
     """
-    found: list[tuple[tuple[int, ...], Finding]] = []
+    model, found = likelihood.problem.residuals.model, list[tuple[tuple[int, ...], Finding]]()
     left = [
         finding.quantity.members[0]
         for finding in findings
@@ -182,7 +174,7 @@ def find_trade_offs(
     for pair in combinations(left, 2):
         candidates = find_combinations(model, list(pair))
         best = min(candidates, key=likelihood.deviation, default=None)
-        if best is not None and likelihood.deviation(best) < WORTH_A_PROFILE:
+        if best is not None and likelihood.deviation(best) < levels.WORTH_A_PROFILE:
             ((finding,),) = compute_findings([likelihood], [best])
             found.append((pair, finding))
     return [

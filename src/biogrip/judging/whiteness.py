@@ -34,6 +34,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.special import betainc, betaincc, betaincinv, fdtrc, ndtr, ndtri, pdtrc, stdtr
 
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.digits import p_value, plain
@@ -121,8 +122,6 @@ def averaged(basis: Array) -> Array:
 
 def _chance_of_less(observed: float, first: float, second: float, free: int, most: float) -> float:
     """Return the chance of a smaller ratio, by the traces of M A and its square, and the most."""
-    from scipy.special import betainc
-
     mean = first / free
     variance = 2 * (second - first**2 / free) / (free * (free + 2))
     share = mean / most
@@ -190,8 +189,6 @@ def far_out(residual: Array, struck: BoolArray, basis: Array) -> float:
     with Student's distribution [3]_. That of the nearest of them, and their number, have Poisson's
     distribution, and so has that of the farthest alone.
     """
-    from scipy.special import pdtrc, stdtr
-
     count = int(np.count_nonzero(struck))
     free = len(residual) - count - len(basis)
     if not count or free < 1:
@@ -297,8 +294,6 @@ class Steps:
 
     def chance(self, share: float) -> float:
         """Return the chance that white noise has such a share of its squares in one of them."""
-        from scipy.special import betaincc, ndtr, ndtri
-
         alone = float(betaincc(0.5, 0.5 * (self.freedom - 1), min(share, 1.0)))
         level, change = -float(ndtri(max(alone, 1e-300) / 2)), self._change
         half = np.maximum(0.5 * level * np.sqrt(2 * change), 1e-9)
@@ -315,7 +310,6 @@ class Steps:
     def critical(self, level: float) -> float:
         """Return the distance in standard deviations at which a scan's chance is a level."""
         from scipy.optimize import brentq
-        from scipy.special import betaincinv
 
         most = float(betaincinv(0.5, 0.5 * (self.freedom - 1), 1 - 1e-12))
         share = brentq(lambda share: self.chance(share) - level, 1e-9, most)
@@ -392,8 +386,6 @@ def parts_apart(basis: Array, split: int) -> Array:
 
 def compare_halves(residual: Array, basis: Array, split: int) -> float:
     """Return the chance that parts of white noise before and after a reading differ as much."""
-    from scipy.special import fdtrc
-
     more = parts_apart(basis, split)
     left = len(residual) - len(basis) - len(more)
     if not len(more) or left < 1:
@@ -405,10 +397,8 @@ def compare_halves(residual: Array, basis: Array, split: int) -> float:
 
 def find_inertia(
     residuals: Residuals, residual: Array, basis: Array, growth: Array | float = 1.0
-) -> str:
-    """Return in words what may make moduli wrong: inertia, if an F test tells it, or what else."""
-    from scipy.special import fdtrc
-
+) -> tuple[bool, str]:
+    """Return True if an F test tells inertia, and in words what may make moduli wrong."""
     places, free = residuals.trace.time_s, len(residual) - len(basis)
     squared = np.where(is_storage(places), places**2, 0.0)
     shape = without(basis, residuals.trace.condensed.cleared(squared) / growth)
@@ -416,9 +406,10 @@ def find_inertia(
     size = float(shape @ residual) / square
     explained = size**2 * square
     if fdtrc(1, free - 1, explained * (free - 1) / (total - explained)) >= levels.FALSE_ALARM:
-        return "a column of something else, slip, too large a strain, or a sample that changed"
+        what = "a column of something else, slip, too large a strain, or a sample that changed"
+        return False, what
     part = plain(100 * abs(size) * float(places[-1]) ** 2 / float(residuals.trace.readings[-1]), 2)
-    return (
+    return True, (
         "inertia of the instrument or the sample, as the storage modulus has a part that goes with "
         f"the frequency squared, {part} % at the highest: correct for it, or leave the highest "
         "frequencies out (--until)"
@@ -433,11 +424,9 @@ def about_moduli(
     The tests are for inertia; for moduli that differ, if each is fitted by itself; and for one that
     scatters more than the other for its weights, by an F test.
     """
-    from scipy.special import fdtrc
-
     storage = is_storage(residuals.trace.time_s)
-    cause = find_inertia(residuals, residual, basis, growth)
-    if cause.startswith("inertia"):
+    is_inertia, cause = find_inertia(residuals, residual, basis, growth)
+    if is_inertia:
         yield f"The fit leaves what is of {cause}."
     elif (chance := compare_halves(residual, basis, int(np.sum(~storage)))) < levels.FALSE_ALARM:
         yield (

@@ -37,7 +37,7 @@ from scipy.special import chdtrc, chdtri, fdtri
 from biogrip.arrays import Array, BoolArray
 from biogrip.digits import plain, with_limits
 from biogrip.fit.any_sample import AnySampleFit, Lags, count_lags, fit_any_sample
-from biogrip.judging.levels import CERTAIN_MISFIT, TOO_MUCH
+from biogrip.judging import levels
 from biogrip.judging.verdicts import verdict_of
 from biogrip.judging.whiteness import as_correlated, correlated
 from biogrip.physics.residuals import Residuals
@@ -169,17 +169,16 @@ def tell_without_model(
     residuals: Residuals,
     *,
     confidence: float,
-    noise_sd: float | None = None,
     at_s: Sequence[float] = (),
     kinds: Collection[str] = KINDS,
 ) -> WithoutModel:
     """Tell what a trace says of any linear sample, whatever its model.
 
     The model of the residuals is not used. The confidence, such as 0.95, is of two limits; a single
-    limit is one of such a pair. The standard deviation of the noise is given if it is known. Times
-    in s after a step, whose inverses are angular frequencies, are by default one a decade. Of
-    `KINDS`, some are told.
+    limit is one of such a pair. Times in s after a step, whose inverses are angular frequencies,
+    are by default one a decade. Of `KINDS`, some are told.
     """
+    noise_sd = residuals.trace.known_noise
     fit = fit_any_sample(residuals)
     free, sd, left = fit.free, fit.sd, fit.left_of_readings()
     _, chance = correlated(*left)
@@ -187,12 +186,12 @@ def tell_without_model(
     if noise_sd is not None:
         too_large = float(chdtrc(free, free * times**2))
         chance = min(chance, too_large)
-        if too_large >= CERTAIN_MISFIT:
+        if too_large >= levels.CERTAIN_MISFIT:
             sd, freedom = noise_sd, math.inf
     elif residuals.free <= fit.taken:
         # It leaves nothing that tells the noise.
         sd = max(sd, residuals.noise_scale)
-    is_linear = chance >= CERTAIN_MISFIT or times <= TOO_MUCH
+    is_linear = chance >= levels.CERTAIN_MISFIT or times <= levels.TOO_MUCH
     if not is_linear:
         independent, freedom = as_correlated(*left)
         sd = fit.sd * math.sqrt(free / independent)

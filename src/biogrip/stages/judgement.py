@@ -69,9 +69,7 @@ def expect(case: Case, target: Path, calibrated: list[Path], expected: Path) -> 
     if gain < _ROUNDING:
         # Along what nothing tells, digits of the target would choose, and those of a processor.
         found = found.replaced(np.exp(truth), misfit, converged=True)
-    diagnosis = diagnose(
-        problem, experiment.searched, found, confidence=case.confidence, noise_sd=noise_sd
-    )
+    diagnosis = diagnose(problem, found, confidence=case.confidence)
     _write(expected, case, diagnosis, {})
 
 
@@ -168,8 +166,7 @@ def judge_quantities(
         return [profiled(*pair, []) for pair in zip(likelihoods, every, strict=True)]
 
     problems, found = [fit.problem for fit in fits], [fit.found for fit in fits]
-    noise_sd = [None] * len(fits)
-    judged = settled(problems, found, profile, confidence=confidence, noise_sd=noise_sd)
+    judged = settled(problems, found, profile, confidence=confidence)
     return [diagnosis for diagnosis, _ in judged]
 
 
