@@ -127,10 +127,14 @@ def test_with_coloured_noise_an_offset_and_a_drift_are_fitted(tmp_path: Path) ->
 
 def test_the_paper_s_errors_are_signed_numbers(tmp_path: Path) -> None:
     """They are printed as they stand, in tables that spreadsheets open."""
+    published = "published: {table: 5, identified: {}, error_percent: {k: 'ERROR'}}"
+    text = f"cases: {{x: {{{DROP}, {published}}}}}"
     for error in ("-0.8", ">100", "0", "6.1", "<0.001", ">+5", "+2.6"):
-        published = f"{{table: 5, identified: {{}}, error_percent: {{k: '{error}'}}}}"
-        case = load(tmp_path, f"cases: {{x: {{{DROP}, published: {published}}}}}").cases["x"]
+        case = load(tmp_path, text.replace("ERROR", error)).cases["x"]
         assert case.published.error_percent["k"] == error
+    for error in ("=1+1", "+1+1", "@SUM(A1)", "a|b", ">>100", "1111111111111", "-"):
+        said = refusal(tmp_path, text.replace("ERROR", error))
+        assert "allowed is a number of at most 12 characters" in said
 
 
 # Snakemake hands over all that stands in a block of its command line as text.
@@ -259,6 +263,57 @@ def test_points_are_the_base_case_with_two_values_changed(tmp_path: Path) -> Non
     texts = [SWEEP.replace("[0.1, 2e-2]", f"[{one}]") for one in ("1", "1.0", "1e0", "10e-1")]
     first, *others = (set(load(tmp_path, text).points) for text in texts)
     assert others == [first] * 3
+
+
+# What stands in the place of what in that sweep, and a regular expression of what is said of it.
+REFUSED_SWEEPS = (
+    ("  noise:", "  no-ise:", r"line 2: sweeps.no-ise: not a usable sweep name: a letter"),
+    (
+        ".level",
+        ".levle",
+        r"line 4: .*rows.values\[0\]: gives .*noise.levle: unknown key. Did you m",
+    ),
+    ("measurement.noise.level", "sample.k", r"found 'sample.k', allowed is a key in a block that"),
+    (
+        "noise\n",
+        "rate_Hz\n",
+        r"_2--noise--0_1--.*: gives .*Hz: found a block of keys, allowed is a n",
+    ),
+    (
+        "2e-2",
+        "-2",
+        r"my.yaml, line 4: .*rows.values\[1\]: gives .*level: found -2, allowed is at l",
+    ),
+    ("2e-2", "0.1000000000000000001", r"rows.values: holds something twice"),
+    (
+        "signal, kind: gaussian",
+        "peak, kind: uniform",
+        r"line 2: .*has the point .*--0_1--uniform-p",
+    ),
+    ("label: b", "label: a", r"line 10: sweeps.noise.columns.values\[1\]: is called 'a' like"),
+    (
+        "uniform",
+        "unifrom",
+        r"line 9: .*columns.values\[0\]: gives .*kind: found 'unifrom'. Did you",
+    ),
+    (
+        "kind: u",
+        "level: 1, kind: u",
+        r"columns.values\[0\]: sets measurement.noise.level, which th",
+    ),
+    (
+        "noise.level, values: [0.1,",
+        "rate_Hz, values: [1e-3,",
+        r"line 4: .*\[0\]: gives .*Hz: found",
+    ),
+)
+
+
+@pytest.mark.parametrize(("old", "new", "words"), REFUSED_SWEEPS)
+def test_a_bad_sweep_is_explained(tmp_path: Path, old: str, new: str, words: str) -> None:
+    assert SWEEP.count(old) == 1
+    said = refusal(tmp_path, SWEEP.replace(old, new))
+    assert re.search(words, said), said
 
 
 def test_a_list_of_keys_changes_all_of_them(tmp_path: Path) -> None:
