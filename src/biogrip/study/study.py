@@ -7,7 +7,7 @@ under other readings of the paper, are checked as if they were cases of the conf
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, reduce
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,7 @@ from biogrip.physics.models import CANDIDATES, UNPUBLISHED, Published, Sample
 from biogrip.physics.noise import Noise
 from biogrip.physics.protocol import Course, Phase, join_phases, sample_times
 from biogrip.physics.sample_model import Network, with_fixed
-from biogrip.study.case_blocks import CALIBRATED, OVERRIDABLE, CaseBlock
+from biogrip.study.case_blocks import OVERRIDABLE, CaseBlock
 from biogrip.study.config import StudyConfig, list_points, point_blocks
 from biogrip.study.messages import checked, with_numbers
 from biogrip.study.source import (
@@ -138,28 +138,18 @@ class Case:
         closing = self._contact.closing if self._contact else 0.0
         return math.radians(self.study.actuator.stroke_deg) - closing
 
-    @property
-    def is_calibrated(self) -> bool:
-        """True if the identification takes the gripper from a test without sample."""
-        return self.block.assumed_gripper == CALIBRATED
-
     @cached_property
     def sample(self) -> Sample:
         """Constitutive model."""
         return replace(self.block.sample.sample, stiffness=self.instrument.stiffness)
 
     @property
-    def fixed(self) -> dict[str, float]:
-        """Parameters that are not identified, by name."""
-        return {name: float(value) for name, value in self.block.fixed.items()}
-
-    @property
     def parameters(self) -> dict[str, float]:
         """True parameters by name, SI units, branches by relaxation time; none if recorded."""
         given, model = self.block.sample.parameters, self.sample.model
-        known = {name: float(given[name]) for name in model.names if name in given}
+        known = {name: given[name] for name in model.names if name in given}
         whole = len(known) == len(model.names)
-        return with_fixed(model, self.fixed).named_in_order(known) if whole else known
+        return with_fixed(model, self.block.fixed).named_in_order(known) if whole else known
 
     @cached_property
     def network(self) -> Network:
@@ -190,7 +180,7 @@ class Case:
             self.phases,
             ranges,
             self.sample,
-            self.fixed,
+            self.block.fixed,
             self.instrument,
             offset=measurement.fits_offset,
             drift=measurement.fits_drift,
@@ -238,9 +228,9 @@ class Case:
     @property
     def has_valley(self) -> bool:
         """True if two exchangeable parameters are searched, and others besides."""
-        model = self.sample.model
-        pair = [name for name in model.exchangeable if name not in self.fixed]
-        return len(pair) == 2 and len(model.names) - len(self.fixed) > 2
+        searched = [parameter.name for parameter in self.block.searched]
+        pair = {*self.sample.model.exchangeable} & {*searched}
+        return len(pair) == 2 and len(searched) > 2
 
 
 @dataclass(frozen=True)
@@ -372,10 +362,7 @@ def default_ranges() -> dict[str, GeneRange]:
 
 def read_configs(files: Iterable[Path]) -> dict[str, Any]:
     """Read config files and merge them, the later over the earlier, see `read_config`."""
-    merged: dict[str, Any] = {}
-    for file in files:
-        merged = overlaid(merged, read_config(file))
-    return merged
+    return reduce(overlaid, map(read_config, files), {})
 
 
 def load_given_study(given: Mapping[str, Any], files: Sequence[Path]) -> Study:

@@ -149,15 +149,13 @@ def coverage(
 ) -> ShownTable:
     """Compare estimates and intervals of many seeds with the true values and the bound.
 
-    Targets are files of all cases, in their order; calibrated grippers those of the cases that have
-    one.
+    Targets are files of all cases, in their order; calibrated grippers are named like their case.
     """
-    calibrations = iter(calibrated)
     rows: list[Row] = []
     estimated = pd.concat([read_intervals(study, it) for it in intervals], ignore_index=True)
     for (name, case), target in zip(study.cases.items(), targets, strict=True):
         found = estimated[estimated["case"] == name]
-        own = [next(calibrations)] if case.is_calibrated else []
+        own = [file for file in calibrated if file.stem == name]
         for quantity, limit in bounds_at_truth(case, target, own):
             mine = found[found["quantity"] == quantity.label]
             fitted = mine[mine["estimate_rest_known"].notna()]
