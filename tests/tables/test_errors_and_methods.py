@@ -6,7 +6,6 @@ import pandas as pd
 import pytest
 from scipy.stats import binomtest
 
-from biogrip.fit.problem import METHODS
 from biogrip.physics.models import MODELS, Published, Sample
 from biogrip.records.identifications import (
     ALL,
@@ -86,9 +85,9 @@ def test_joined_errors_are_within_the_tolerance_their_heading_names(eleven_seeds
 
 def study(parameters: dict[str, float], samples: int, *methods: str, seeds: int = 1) -> Any:
     known = {"sample": Sample("generalized_maxwell"), "parameters": parameters, "seeds": seeds}
-    own, near = seen(config=seen(methods=methods)), {"near_noise_tolerance": 0.02}
-    drop = seen(name="drop", times_s=range(samples), study=own, **known)
-    return seen(cases={"drop": drop}, identifiers=METHODS, optimum_tolerance=1.0, **near)
+    own = seen(config=seen(methods=methods), near_noise_tolerance=0.02, optimum_tolerance=1.0)
+    own.cases = {"drop": seen(name="drop", times_s=range(samples), study=own, **known)}
+    return own
 
 
 def test_methods_are_counted_against_what_genes_can_encode(tmp_path: Path) -> None:

@@ -175,27 +175,28 @@ def basins(found: "pd.DataFrame", tolerance: float) -> "dict[str, pd.DataFrame]"
     return {"near the noise": found[near], "above the noise": found[~near]}
 
 
-def chi_square_increase(found: "pd.DataFrame", samples: int, of: str = "misfit") -> Array:
+def chi_square_increase(found: "pd.DataFrame", case: Case, of: str = "misfit") -> Array:
     """Return the increase of each identification's chi^2 over the lowest of its trace, (n,).
 
-    Identifications of one case by all methods are given, the number of readings in a trace, and the
-    column of misfits. The lowest is that of any method, or that of the true parameters where these
-    are known; the best fit of a few parameters lies below the latter.
+    Identifications by all methods are given, and the column of misfits. The lowest is that of any
+    method, or that of the true parameters where these are known; the best fit of a few parameters
+    lies below the latter.
     """
     misfit = found["misfit"]
     lowest = misfit.groupby(found["seed"]).transform("min")
     lowest = np.fmin(lowest, found["noise_rms"].where(found["noise_rms"] > 0))
-    increase: Array = samples * ((found[of] / lowest) ** 2 - 1).to_numpy(float)
+    increase: Array = len(case.times_s) * ((found[of] / lowest) ** 2 - 1).to_numpy(float)
     return increase
 
 
-def reached_encodable(found: "pd.DataFrame", samples: int, tolerance: float) -> BoolArray:
-    """Return True for each run with chi^2 at most `tolerance` above the best encodable point, (n,).
+def reached_encodable(found: "pd.DataFrame", case: Case) -> BoolArray:
+    """Return True for each run with chi^2 at most a tolerance above the best encodable point, (n,).
 
     Every method can reach this point or lie below it, with digits or without.
     """
     misfit, encodable = (found[name].to_numpy(float) for name in ("misfit", "encodable_misfit"))
-    reached: BoolArray = samples * (misfit**2 - encodable**2) <= tolerance * encodable**2
+    above = len(case.times_s) * (misfit**2 - encodable**2)
+    reached: BoolArray = above <= case.study.optimum_tolerance * encodable**2
     return reached
 
 

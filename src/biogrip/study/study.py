@@ -331,11 +331,6 @@ class Study:
         return self.config.protocol.make_phases(GRIPPER, self.actuator)
 
     @property
-    def identifiers(self) -> dict[str, Method]:
-        """Declarations of the methods, by name."""
-        return {name: METHODS[name] for name in self.config.methods}
-
-    @property
     def shown(self) -> str:
         """Name of the method that tables and figures of a single method show."""
         return self.config.methods[0]
@@ -348,7 +343,7 @@ class Study:
     @property
     def fitting_method(self) -> Method:
         """Least squares if the study has it, else the shown method."""
-        return self.identifiers.get("least_squares", self.shown_method)
+        return METHODS["least_squares" if "least_squares" in self.config.methods else self.shown]
 
 
 _SHOWN = 6

@@ -8,6 +8,7 @@ import pandas as pd
 from scipy.special import betaincinv
 
 from biogrip.fit.nested_fits import aic_and_bic
+from biogrip.fit.problem import METHODS
 from biogrip.judging.levels import WIDE
 from biogrip.judging.likelihood import bound
 from biogrip.judging.quantities import Quantity, parameters_and_sum
@@ -45,14 +46,14 @@ def methods(study: Study, identifications: list[Path]) -> ShownTable:
     labels = {}
     for (name, case), path in zip(study.cases.items(), identifications, strict=True):
         found = read_identifications(path, case)
-        found["increase"] = chi_square_increase(found, len(case.times_s))
-        found["least"] = chi_square_increase(found, len(case.times_s), ENCODABLE)
-        found["reached"] = reached_encodable(found, len(case.times_s), study.optimum_tolerance)
+        found["increase"] = chi_square_increase(found, case)
+        found["least"] = chi_square_increase(found, case, ENCODABLE)
+        found["reached"] = reached_encodable(found, case)
         for method, mine in found.groupby("method", sort=False):
             share, low, high = share_with_limits(int(mine["reached"].sum()), len(mine))
             row: Row = {
                 "case": name,
-                "method": study.identifiers[method].title,
+                "method": METHODS[method].title,
                 "seeds": len(mine),
                 "reached_share": share,
                 "reached_low": low,
