@@ -50,18 +50,16 @@ def methods(study: Study, identifications: list[Path]) -> ShownTable:
         found["least"] = chi_square_increase(found, case, ENCODABLE)
         found["reached"] = reached_encodable(found, case)
         for method, mine in found.groupby("method", sort=False):
-            share, low, high = share_with_limits(int(mine["reached"].sum()), len(mine))
             row: Row = {
                 "case": name,
                 "method": METHODS[method].title,
                 "seeds": len(mine),
-                "reached_share": share,
-                "reached_low": low,
-                "reached_high": high,
                 "median_rise": np.median(mine["increase"]),
                 "encodable_rise": np.median(mine["least"]),
                 "median_evaluations": float(mine["evaluations"].median()),
             }
+            shares = share_with_limits(int(mine["reached"].sum()), len(mine))
+            row |= zip(("reached_share", "reached_low", "reached_high"), shares, strict=True)
             for quantity in case.sample.model.quantities:
                 label = " + ".join(p.name for p in quantity)
                 values = mine[[p.column for p in quantity]].sum(axis=1).to_numpy(float)
