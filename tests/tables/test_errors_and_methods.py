@@ -6,6 +6,7 @@ import pandas as pd
 import pytest
 from scipy.stats import binomtest
 
+from biogrip.fit.problem import METHODS
 from biogrip.physics.models import MODELS, Published, Sample
 from biogrip.records.identifications import (
     ALL,
@@ -47,7 +48,9 @@ def eleven_seeds(tmp_path: Path) -> Path:
 
 def case_of(near_noise_tolerance: float = 0.02) -> Any:
     config = seen(methods=["genetic"])
-    study = seen(shown="genetic", near_noise_tolerance=near_noise_tolerance, config=config)
+    study = seen(
+        shown_method=METHODS["genetic"], near_noise_tolerance=near_noise_tolerance, config=config
+    )
     known = {"sample": Sample("generalized_maxwell"), "parameters": TRUE, "published": PAPER}
     return seen(name="drop", title="A drop", seeds=11, study=study, **known)
 

@@ -62,7 +62,7 @@ def fits_of_basins(
     case: Case, identifications: Path, measurements: list[Path], calibrated: list[Path]
 ) -> dict[str, Fit]:
     """Return the fit of the first run of each basin, by label, from files of a case."""
-    found = read_identifications(identifications, case, case.study.shown)
+    found = read_identifications(identifications, case, case.study.shown_method.name)
     fits = {}
     for words, run in first_of_basins(found, case).items():
         seed = int(run["seed"])

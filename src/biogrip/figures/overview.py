@@ -76,7 +76,7 @@ def draw_overview(
     style.panel(axes[0], "a", cases[0].title)
     files = zip(axes[1:], cases, identifications, expected, strict=True)
     for index, (scatter, case, path, judged) in enumerate(files):
-        found = read_identifications(path, case, study.shown)
+        found = read_identifications(path, case, study.shown_method.name)
         quantities = read_verdicts(judged)["quantities"]
         bounded = {it["quantity"] for it in quantities if it["verdict"] != BOUNDED_ABOVE}
         _scatter(scatter, case, first_seeds(found), bounded)
@@ -229,11 +229,11 @@ def _moduli(axes: Axes, study: Study, case: Case, identified: Path, time_s: Arra
         fits = found[[p.column for p in model.parameters]].to_numpy(float)
         moduli = _modulus(model.network(fits), omega)
         near.append(moduli[near_noise(found, study.near_noise_tolerance)])
-        look = style.line_of(method) | {"linewidth": 0.4, "alpha": 0.45}
+        look: dict[str, Any] = {"color": method.color, "linewidth": 0.4, "alpha": 0.45}
         for index, modulus in enumerate(moduli):
             label = method.title if index == 0 else None
             for part, dashed in ((modulus.real, "-"), (modulus.imag, "--")):
-                axes.plot(omega, part, **look | {"linestyle": dashed}, label=label)
+                axes.plot(omega, part, dashed, label=label, **look)
                 label = None
     fitting = np.concatenate(near)
     # In the upper half and, hatched, in the lower one.

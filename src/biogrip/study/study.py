@@ -294,8 +294,8 @@ class Study:
     @property
     def counted(self) -> list[str]:
         """Names of those of which every trace gets the verdicts that users are shown."""
-        cases = {name: self.cases[name].block for name in self.covered}
-        return [name for name, it in cases.items() if it.identifiability.verdicts_every == 1]
+        covered = self.of(self.covered)
+        return covered._where(lambda case: case.block.identifiability.verdicts_every == 1)
 
     @property
     def published(self) -> list[str]:
@@ -331,19 +331,15 @@ class Study:
         return self.config.protocol.make_phases(GRIPPER, self.actuator)
 
     @property
-    def shown(self) -> str:
-        """Name of the method that tables and figures of a single method show."""
-        return self.config.methods[0]
-
-    @property
     def shown_method(self) -> Method:
-        """Declaration of the shown method."""
-        return METHODS[self.shown]
+        """Method that tables and figures of a single method show."""
+        return METHODS[self.config.methods[0]]
 
     @property
     def fitting_method(self) -> Method:
         """Least squares if the study has it, else the shown method."""
-        return METHODS["least_squares" if "least_squares" in self.config.methods else self.shown]
+        has_it = "least_squares" in self.config.methods
+        return METHODS["least_squares"] if has_it else self.shown_method
 
 
 _SHOWN = 6
