@@ -114,7 +114,7 @@ def test_a_trace_is_identified_again_by_a_model_s_usual_name_and_drawn_by_its_cl
 def test_a_prony_series_has_no_damper_beside_its_branches(name: str, branches: int) -> None:
     case, _ = case_of(Asked(EXAMPLE, None, (Setting("--model", ("sample", "model"), name),)))
     assert (case.sample.name, case.sample.branches) == ("generalized_maxwell", branches)
-    assert case.fixed == {"c_p": 0.0}
+    assert case.block.fixed == {"c_p": 0.0}
 
 
 def test_what_cannot_be_used_is_said_by_the_name_of_the_argument() -> None:

@@ -85,16 +85,12 @@ def test_no_more_seeds_are_drawn_than_can_be_seen(tmp_path: Path) -> None:
     for seeds, above, others, label in (few, many):
         numbers = np.arange(seeds)
         misfit = np.where(numbers < above, 1.0, 1.5)
-        found = identified(tmp_path, misfit=misfit)
+        found = identified(tmp_path, case=CASE, misfit=misfit)
         history = {"seed": np.tile(numbers, 4), "generation": np.repeat([0, 1, 0, 1], seeds)}
         history["best_misfit"] = np.tile(misfit, 4)
         history["method"] = np.repeat(["genetic", "least_squares"], 2 * seeds)
         write_arrays(tmp_path / "history.npz", history)
-        config = seen(methods=["genetic"])
-        study = seen(shown_method=METHODS["genetic"], near_noise_tolerance=0.02, config=config)
-        block = seen(genetic_algorithm=seen(mutation_start=20))
-        known = {"name": "x", "seeds": seeds, "sample": Sample(MODEL.name), "study": study}
-        case = seen(title="A cell", block=block, **known)
+        case = study_of(f"seeds: {seeds}\nmethods: [genetic]").cases[CASE]
         drawn = draw_convergence(case, found, tmp_path / "history.npz")
         (axes,), (legend,) = drawn.axes, drawn.legends
         colors = [line.get_color() for line in axes.lines if len(np.asarray(line.get_xdata()))]
@@ -200,9 +196,8 @@ def test_prefixes_dollars_and_methods() -> None:
     scales = {2.0: (1.0, "rad"), 3e-3: (1e3, "mrad"), 3e-5: (1e6, "µrad"), 3e-8: (1e9, "nrad")}
     assert {value: scale_of(np.array([-value, 0.0]), "rad") for value in scales} == scales
     assert style.literal("5$ a day") == r"5\$ a day"
-    assert len({(*style.line_of(it).values(),) for it in METHODS.values()}) == len(METHODS)
-    dashes = [style.line_of(it)["linestyle"] for it in METHODS.values()]
-    assert dashes == ["-", "-", "--", "-."]
+    assert len({it.color for it in METHODS.values()}) == len(METHODS)
+    assert [it.dashes for it in METHODS.values()] == ["-", "-", "--", "-."]
 
 
 def test_points_beyond_an_axis_are_triangles_at_its_edge() -> None:

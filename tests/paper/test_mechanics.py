@@ -9,6 +9,7 @@ import pytest
 from matplotlib.axes import Axes
 
 from biogrip import library
+from biogrip.errors import BiogripError
 from biogrip.fit.genome import GeneRange
 from biogrip.physics.gripper import torque
 from biogrip.physics.models import MODELS, Published, Sample
@@ -16,9 +17,11 @@ from biogrip.records.identifications import READINGS, columns, read_identificati
 from biogrip.stages.identification import identify
 from biogrip.stages.targets import measure, simulate
 from biogrip.study.study import Study
+from biogrip.tables.layout import Column, ShownTable, write
 from tests.helpers.default import STUDY, seen, study_of
 from tests.helpers.places import ROOT
 from workflow.paper import readings
+from workflow.paper.check import compare
 from workflow.paper.evidence import evidence, printed_values, sampling_evidence
 from workflow.paper.linearisation import DIFFERENCES, linearisation
 from workflow.paper.mechanics import contact_loss, left_out, mechanics
@@ -303,3 +306,26 @@ def test_one_that_changes_nothing_finds_what_the_study_finds(tmp_path: Path) -> 
     found = readings.found_by_readings(study, readings.read(study, [interpreted])).rows
     titles = [row["reading"] for row in found]
     assert titles == ["as printed", "patient", "three digits", "uniform noise", "slow"]
+
+
+def test_regenerated_tables_are_the_same_bytes_or_their_lines_are_shown(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    published, made = tmp_path / "published", tmp_path / "made"
+    for folder in (published, made):
+        folder.mkdir()
+        (folder / "a.csv").write_text("k,c\n1,2\n3,4\n")
+    write(ShownTable("Text.", (Column("k", "k"),), [{"k": 1.5}]), made / "b.csv")
+    (published / "b.md").write_text("Text.\n\n| k   |\n|:----|\n| 1.5 |\n")
+    files = [made / "a.csv", made / "b.html"]
+    compare(published, files)
+    assert capsys.readouterr().out.startswith("2 files of tables compared with ")
+    (made / "a.csv").write_text("k,c\n1,2\n3,5\n")
+    (made / "c.csv").write_text("new\n")
+    with pytest.raises(BiogripError) as error:
+        compare(published, [*files, made / "c.csv"])
+    said = str(error.value).splitlines()
+    assert said[0] == f"the regenerated tables differ from {published}."
+    assert said[-3:] == ["-3,4", "+3,5", "c.csv: is not published."]
+    with pytest.raises(BiogripError, match="holds no tables to compare with"):
+        compare(published, [])

@@ -44,7 +44,7 @@ def test_a_protocol_that_makes_the_jaws_pull_is_warned_of(
     said = capsys.readouterr()
     assert "biogrip: warning: Drop: under this protocol the jaws would have to pull" in said.out
     assert "from 100 s on" in said.err
-    time_s, _, bilateral = read_target(file, drop(1e-9, hold(100.0, 1e-10)).times_s)
+    time_s = drop(1e-9, hold(100.0, 1e-10)).times_s
     force = pd.read_csv(file)["jaw_force_N"].to_numpy()
     assert np.all(force[time_s < 100] >= 0)
     assert force[time_s > 100].max() < 0
@@ -52,12 +52,9 @@ def test_a_protocol_that_makes_the_jaws_pull_is_warned_of(
     assert "contact is lost there, which its identification ignores" in capsys.readouterr().out
     force = pd.read_csv(file)["jaw_force_N"].to_numpy()
     assert np.all(force[time_s > 100] == 0)
-    rotation = read_target(file, time_s)[2]
     # Left to their hinges, the arms open at once.
+    rotation = read_target(file, time_s)[2]
     np.testing.assert_allclose(rotation[time_s > 100], 1e-10 / 4.4e-7, rtol=1e-8)
-    # Below 100 s only inertia differs, by less than 4e-6 of the peak.
-    until = (time_s > 0) & (time_s < 100)
-    assert np.max(np.abs(rotation - bilateral)[until]) < 1e-5 * rotation.max()
 
 
 def test_all_stages_weight_the_readings_of_a_recorded_trace(tmp_path: Path) -> None:

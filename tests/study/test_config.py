@@ -70,7 +70,7 @@ def test_a_study_has_only_the_cases_that_it_names_or_does_not_drop(tmp_path: Pat
     assert list(load(tmp_path, f"only: {only}\ncases: {{drop: {{{DROP}}}}}").cases) == only
 
 
-# A config, and a regular expression of what is said of it.
+# A config, or what stands for what in `SWEEP`, and a regular expression of what is said of it.
 REFUSED = re.findall(
     r"(.+?)\n=> (.+?)\n", Path(__file__).with_name("refused.txt").read_text("utf-8"), re.DOTALL
 )
@@ -78,6 +78,10 @@ REFUSED = re.findall(
 
 @pytest.mark.parametrize(("text", "words"), REFUSED, ids=[text[:40] for text, _ in REFUSED])
 def test_bad_config_is_explained(tmp_path: Path, text: str, words: str) -> None:
+    if text.startswith("SWEEP with "):
+        old, new = text.removeprefix("SWEEP with ").split(" -> ")
+        assert SWEEP.count(old) == 1
+        text = SWEEP.replace(old, new)
     said = refusal(tmp_path, text.replace("MANY", ", ".join(map(str, range(6000)))))
     assert re.search(words, said), said
 
@@ -127,10 +131,14 @@ def test_with_coloured_noise_an_offset_and_a_drift_are_fitted(tmp_path: Path) ->
 
 def test_the_paper_s_errors_are_signed_numbers(tmp_path: Path) -> None:
     """They are printed as they stand, in tables that spreadsheets open."""
+    published = "published: {table: 5, identified: {}, error_percent: {k: 'ERROR'}}"
+    text = f"cases: {{x: {{{DROP}, {published}}}}}"
     for error in ("-0.8", ">100", "0", "6.1", "<0.001", ">+5", "+2.6"):
-        published = f"{{table: 5, identified: {{}}, error_percent: {{k: '{error}'}}}}"
-        case = load(tmp_path, f"cases: {{x: {{{DROP}, published: {published}}}}}").cases["x"]
+        case = load(tmp_path, text.replace("ERROR", error)).cases["x"]
         assert case.published.error_percent["k"] == error
+    for error in ("=1+1", "+1+1", "@SUM(A1)", "a|b", ">>100", "1111111111111", "-"):
+        said = refusal(tmp_path, text.replace("ERROR", error))
+        assert "allowed is a number of at most 12 characters" in said
 
 
 # Snakemake hands over all that stands in a block of its command line as text.

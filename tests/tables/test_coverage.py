@@ -10,7 +10,7 @@ from biogrip.records.identifications import INTERVALS
 from biogrip.records.rows import read_rows, write_object
 from biogrip.stages import judgement as stage
 from biogrip.stages import targets
-from biogrip.tables.layout import Column, ShownTable, compare, convert, write
+from biogrip.tables.layout import Column, ShownTable, convert, write
 from biogrip.tables.study import coverage, verdict_counts
 from tests.helpers.default import study_of
 
@@ -149,26 +149,3 @@ def test_markup_is_text_in_every_format(tmp_path: Path) -> None:
         assert [len(re.findall(r"(?<!\\)\|", row)) for row in markdown.splitlines()[-3:]] == [2] * 3
         assert "<img" not in markdown + page
         assert read_rows(tmp_path / "t.csv") == [["a"], [given]]
-
-
-def test_regenerated_tables_are_the_same_bytes_or_their_lines_are_shown(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    published, made = tmp_path / "published", tmp_path / "made"
-    for folder in (published, made):
-        folder.mkdir()
-        (folder / "a.csv").write_text("k,c\n1,2\n3,4\n")
-    write(ShownTable("Text.", (Column("k", "k"),), [{"k": 1.5}]), made / "b.csv")
-    (published / "b.md").write_text("Text.\n\n| k   |\n|:----|\n| 1.5 |\n")
-    files = [made / "a.csv", made / "b.html"]
-    compare(published, files)
-    assert capsys.readouterr().out.startswith("2 files of tables compared with ")
-    (made / "a.csv").write_text("k,c\n1,2\n3,5\n")
-    (made / "c.csv").write_text("new\n")
-    with pytest.raises(BiogripError) as error:
-        compare(published, [*files, made / "c.csv"])
-    said = str(error.value).splitlines()
-    assert said[0] == f"the regenerated tables differ from {published}."
-    assert said[-3:] == ["-3,4", "+3,5", "c.csv: is not published."]
-    with pytest.raises(BiogripError, match="holds no tables to compare with"):
-        compare(published, [])

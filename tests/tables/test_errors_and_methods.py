@@ -48,7 +48,9 @@ def eleven_seeds(tmp_path: Path) -> Path:
 
 def case_of(near_noise_tolerance: float = 0.02) -> Any:
     config = seen(methods=["genetic"])
-    study = seen(shown="genetic", near_noise_tolerance=near_noise_tolerance, config=config)
+    study = seen(
+        shown_method=METHODS["genetic"], near_noise_tolerance=near_noise_tolerance, config=config
+    )
     known = {"sample": Sample("generalized_maxwell"), "parameters": TRUE, "published": PAPER}
     return seen(name="drop", title="A drop", seeds=11, study=study, **known)
 
@@ -86,9 +88,9 @@ def test_joined_errors_are_within_the_tolerance_their_heading_names(eleven_seeds
 
 def study(parameters: dict[str, float], samples: int, *methods: str, seeds: int = 1) -> Any:
     known = {"sample": Sample("generalized_maxwell"), "parameters": parameters, "seeds": seeds}
-    own, near = seen(config=seen(methods=methods)), {"near_noise_tolerance": 0.02}
-    drop = seen(name="drop", times_s=range(samples), study=own, **known)
-    return seen(cases={"drop": drop}, identifiers=METHODS, optimum_tolerance=1.0, **near)
+    own = seen(config=seen(methods=methods), near_noise_tolerance=0.02, optimum_tolerance=1.0)
+    own.cases = {"drop": seen(name="drop", times_s=range(samples), study=own, **known)}
+    return own
 
 
 def test_methods_are_counted_against_what_genes_can_encode(tmp_path: Path) -> None:

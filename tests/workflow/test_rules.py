@@ -41,7 +41,7 @@ def test_the_functions_that_a_rule_names_take_what_it_has() -> None:
             stage = getattr(import_module(f"biogrip.{module}"), function)
             assert {*signature(stage).parameters} <= has | {"case", "study", "seeds"}, name
             seen.add(name)
-    assert {"target", "case_tables", "sweep", "check", "convert_table", "page"} <= seen
+    assert {"target", "case_tables", "sweep", "convert_table", "page"} <= seen
 
 
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda file: file.stem)

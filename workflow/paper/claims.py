@@ -312,7 +312,7 @@ def read_results(
     tables["verdicts"] = pd.concat(verdicts, ignore_index=True)
     runs: dict[str, list[pd.DataFrame]] = {}
     for case, found, best in zip(study.cases.values(), identifications, histories, strict=True):
-        if study.shown == "genetic":
+        if study.shown_method.name == "genetic":
             for at, own in read_runs(case, found, best).items():
                 others = [file for file in read if file.stem == case.name and not at]
                 both = [own.assign(able=False)]

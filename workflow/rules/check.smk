@@ -28,11 +28,10 @@ rule check:
     localrule: True
     params:
         published=PUBLISHED / "tables",
-        stages=["tables.layout.compare"],
     message:
         "Comparing the tables with the published ones"
     script:
-        "../scripts/stage.py"
+        "../paper/check.py"
 
 
 rule publish:
@@ -48,4 +47,4 @@ rule publish:
     message:
         "Publishing the tables, the figures and the page"
     script:
-        "../scripts/publish.py"
+        "../paper/publish.py"

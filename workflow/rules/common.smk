@@ -105,7 +105,8 @@ def names(cases):
 
 # Cases that have what only some have, those of sweeps' points among them.
 SIMULATED = [*STUDY.simulated, *STUDY.points]
-CALIBRATED = [n for n in [*STUDY.cases, *STUDY.points] if STUDY.case(n).is_calibrated]
+EVERY = [*STUDY.cases, *STUDY.points]
+CALIBRATED = [n for n in EVERY if STUDY.case(n).block.assumed_gripper == "calibrated"]
 SELECTING = list(STUDY.cases) if STUDY.config.model_selection.models else []
 ANSWERED = [name for name in STUDY.gripped if STUDY.case(name).has_valley][-1:]
 calibration_of = of_case("results/calibrations/{case}.yaml", CALIBRATED)

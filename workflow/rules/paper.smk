@@ -148,7 +148,7 @@ rule readings:
 rule protocols:
     input:
         identifications=files(
-            f"results/identifications/{{case}}/{STUDY.shown}/{{batch}}.csv",
+            f"results/identifications/{{case}}/{STUDY.shown_method.name}/{{batch}}.csv",
             [*STUDY.published, *OTHERS],
         ),
     output:

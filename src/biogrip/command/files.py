@@ -393,7 +393,7 @@ def _assumed(diagnosis: Diagnosis, case: Case, tried: Sequence[str]) -> dict[str
         "model": case.sample.candidate,
         **{name: plain(getattr(block, name)) for name in blocks},
         **({"actuator": plain(case.study.actuator)} if case.instrument.has_jaws else {}),
-        "fixed": case.fixed,
+        "fixed": case.block.fixed,
         "identifiability": {key: plain(getattr(asked, key)) for key in ("confidence", "at_s")},
         "model_selection": {"models": list(tried)},
         "study_seed": case.study.config.study_seed,

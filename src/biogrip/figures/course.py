@@ -17,6 +17,7 @@ from biogrip.arrays import Array
 from biogrip.digits import with_unit
 from biogrip.figures import style
 from biogrip.figures.fit import SHOWN_SEEDS, first_of_basins, seeds_in_words
+from biogrip.fit.problem import METHODS
 from biogrip.judging.verdicts import DETERMINED
 from biogrip.records.identifications import (
     ENCODABLE,
@@ -60,7 +61,7 @@ def _runs(
     """
     method = case.study.shown_method.name
     found = read_identifications(identifications, case, method)
-    runs = first_of_basins(found, case.study.near_noise_tolerance)
+    runs = first_of_basins(found, case)
     first = {words: int(run["seed"]) for words, run in runs.items()}
     histories = read_histories(history, method, values)
     drawn = histories["seed"].isin({*range(SHOWN_SEEDS), *first.values()})
@@ -157,20 +158,21 @@ def draw_evolution(case: Case, identifications: Path, history: Path) -> Figure:
 def draw_waterfall(case: Case, identifications: Path) -> Figure:
     """Draw sorted increases of chi-squared, of every method's runs and of best encodable points."""
     found = read_identifications(identifications, case)
-    increase = np.maximum(chi_square_increase(found, len(case.times_s)), _LOWEST)
-    reached = reached_encodable(found, len(case.times_s), case.study.optimum_tolerance)
+    increase = np.maximum(chi_square_increase(found, case), _LOWEST)
+    reached = reached_encodable(found, case)
     drawn = style.figure(style.COLUMN_IN, 3.5)
     axes = drawn.subplots()
     methods = found["method"].unique()
     # Where curves coincide each is seen beside the thinner ones on top of it.
     for name, width in zip(methods, np.linspace(3.2, 1.0, len(methods)), strict=True):
-        method = case.study.identifiers[name]
+        method = METHODS[name]
         runs = found["method"] == name
         mine = np.sort(increase[runs])
         place = 100 * (np.arange(len(mine)) + 0.5) / len(mine)
         label = f"{method.title}: {share_in_words(int(reached[runs].sum()), len(mine))}"
-        axes.plot(place, mine, label=label, linewidth=width, **style.line_of(method))
-    least = np.sort(chi_square_increase(found, len(case.times_s), ENCODABLE)[runs]).clip(_LOWEST)
+        look = {"color": method.color, "linestyle": method.dashes, "linewidth": width}
+        axes.plot(place, mine, label=label, **look)
+    least = np.sort(chi_square_increase(found, case, ENCODABLE)[runs]).clip(_LOWEST)
     axes.plot(place, least, "--", color=style.TARGET, linewidth=0.8, label="best encodable point")
     axes.set(yscale="log", ylim=(_LOWEST / 2, 5 * float(increase.max())))
     ticks = [tick for tick in 10.0 ** np.arange(-3, 7) if tick < axes.get_ylim()[1]]
@@ -239,7 +241,7 @@ def _quantity(
         shown = mine[:SHOWN_SEEDS]
         # A fixed sideways scatter keeps points apart.
         x = place + 0.6 * ((np.arange(len(shown)) * 0.618034) % 1 - 0.5)
-        look = _DOTS | {"color": style.line_of(case.study.identifiers[name])["color"]}
+        look = _DOTS | {"color": METHODS[name].color}
         points, ends = np.column_stack([x, shown]), ((-np.inf, bottom), (np.inf, top))
         style.points_within(axes, points, *ends, look, edge_size=3)
         low, middle, high = np.clip(quartiles[place], bottom, top)
@@ -263,10 +265,9 @@ def _quantity(
 
 def _legend(drawn: Figure, case: Case, methods: list[str], seeds: int) -> None:
     axes = drawn.axes[0]
-    marks = [(case.study.identifiers[name].title, "o", name) for name in methods]
+    marks = [(METHODS[name].title, "o", METHODS[name].color) for name in methods]
     handles: list[Any] = []
-    for label, marker, name in [*marks, ("beyond the axis", "^", "")]:
-        color = style.line_of(case.study.identifiers[name])["color"] if name else style.TARGET
+    for label, marker, color in [*marks, ("beyond the axis", "^", style.TARGET)]:
         look: dict[str, Any] = {"color": color, "markersize": 4, "markeredgewidth": 0}
         handles += axes.plot([], [], marker, label=label, **look)
     label = f"{100 * case.confidence:g} % by the Cramér-Rao bound (named above), rest known"

@@ -48,13 +48,13 @@ class Fit:
     """What is read."""
 
 
-def first_of_basins(found: pd.DataFrame, tolerance: float) -> dict[str, pd.Series]:
+def first_of_basins(found: pd.DataFrame, case: Case) -> dict[str, pd.Series]:
     """Return the first run of each of the `basins`, by what it is called in a legend."""
     if len(found) == 1:
         return {"the only trace": found.iloc[0]}
     return {
         f"seed {runs['seed'].iloc[0]}" + f", {name}" * (name != ALL): runs.iloc[0]
-        for name, runs in basins(found, tolerance).items()
+        for name, runs in basins(found, case.study.near_noise_tolerance).items()
     }
 
 
@@ -62,9 +62,9 @@ def fits_of_basins(
     case: Case, identifications: Path, measurements: list[Path], calibrated: list[Path]
 ) -> dict[str, Fit]:
     """Return the fit of the first run of each basin, by label, from files of a case."""
-    found = read_identifications(identifications, case, case.study.shown)
+    found = read_identifications(identifications, case, case.study.shown_method.name)
     fits = {}
-    for words, run in first_of_basins(found, case.study.near_noise_tolerance).items():
+    for words, run in first_of_basins(found, case).items():
         seed = int(run["seed"])
         values = {p.name: float(run[p.column]) for p in case.sample.model.parameters}
         holding = next(path for path in measurements if seed in seeds_of(path.stem))

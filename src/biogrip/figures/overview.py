@@ -27,6 +27,7 @@ from biogrip.figures.fit import (
     seeds_in_words,
 )
 from biogrip.figures.likelihood import draw_profile
+from biogrip.fit.problem import METHODS
 from biogrip.judging.verdicts import BOUNDED_ABOVE
 from biogrip.physics.noise import standard_deviation
 from biogrip.physics.sample_model import Network, SampleModel, complex_modulus
@@ -75,10 +76,10 @@ def draw_overview(
     style.panel(axes[0], "a", cases[0].title)
     files = zip(axes[1:], cases, identifications, expected, strict=True)
     for index, (scatter, case, path, judged) in enumerate(files):
-        found = read_identifications(path, case, study.shown)
+        found = read_identifications(path, case, study.shown_method.name)
         quantities = read_verdicts(judged)["quantities"]
         bounded = {it["quantity"] for it in quantities if it["verdict"] != BOUNDED_ABOVE}
-        _scatter(scatter, case, first_seeds(found), study.near_noise_tolerance, bounded)
+        _scatter(scatter, case, first_seeds(found), bounded)
         scatter.set_yticks([1e-3, 1e-2, 0.1, 1, 10, 100, 1e3], [""] * 7 if index else None)
         style.panel(scatter, "bcd"[index], case.title, most_letters=_TITLE_LETTERS)
     axes[1].set_ylabel("identified / target")
@@ -95,10 +96,8 @@ def draw_overview(
     return drawn
 
 
-def _scatter(
-    axes: Axes, case: Case, found: pd.DataFrame, tolerance: float, bounded: set[str]
-) -> None:
-    reached = near_noise(found, tolerance)
+def _scatter(axes: Axes, case: Case, found: pd.DataFrame, bounded: set[str]) -> None:
+    reached = near_noise(found, tolerance := case.study.near_noise_tolerance)
     identified = case.published.identified
     ticks: list[str] = []
     # Sums are told so much better that on an axis of decades they are a line.
@@ -230,11 +229,11 @@ def _moduli(axes: Axes, study: Study, case: Case, identified: Path, time_s: Arra
         fits = found[[p.column for p in model.parameters]].to_numpy(float)
         moduli = _modulus(model.network(fits), omega)
         near.append(moduli[near_noise(found, study.near_noise_tolerance)])
-        look = style.line_of(method) | {"linewidth": 0.4, "alpha": 0.45}
+        look: dict[str, Any] = {"color": method.color, "linewidth": 0.4, "alpha": 0.45}
         for index, modulus in enumerate(moduli):
             label = method.title if index == 0 else None
             for part, dashed in ((modulus.real, "-"), (modulus.imag, "--")):
-                axes.plot(omega, part, **look | {"linestyle": dashed}, label=label)
+                axes.plot(omega, part, dashed, label=label, **look)
                 label = None
     fitting = np.concatenate(near)
     # In the upper half and, hatched, in the lower one.
@@ -302,7 +301,7 @@ def draw_robustness(study: Study, name: str, points: Path) -> Figure:
     Numbers in cells are for the first method; brackets hold the share of the second method, and
     the bound.
     """
-    sweep, methods = study.config.sweeps[name], study.identifiers
+    sweep, methods = study.config.sweeps[name], study.config.methods
     cases = list(sweep.cases)[:_MOST_CASES]
     rows = len(sweep.rows.levels)
     height = min(max(_CELL_IN * rows, 0.9), _TALLEST_IN)
@@ -311,7 +310,7 @@ def draw_robustness(study: Study, name: str, points: Path) -> Figure:
     for index, case in enumerate(cases):
         found = read_points(points, name, case)
         style.panel(grid[0, index], "abc"[index], study.cases[case].title, most_letters=24)
-        first, *others = (found[found["method"] == method] for method in list(methods)[:2])
+        first, *others = (found[found["method"] == method] for method in methods[:2])
         shares = [100 * _grid(sweep, each, "basin_share") for each in (first, *others)]
         _heat_map(grid[0, index], sweep, shares[0], _SHARE, "cividis")
         _write(grid[0, index], shares, _SHARE(shares[0]), "cividis", height / rows)
@@ -331,7 +330,7 @@ def draw_robustness(study: Study, name: str, points: Path) -> Figure:
             axes.text(0.5, 0.5, words, ha="center", transform=axes.transAxes)
     drawn.supylabel(axis_title(study, sweep.rows), fontsize=8)
     drawn.supxlabel(axis_title(study, sweep.columns), fontsize=8)
-    title, *titles = (method.title for method in methods.values())
+    title, *titles = (METHODS[method].title for method in methods)
     bar = drawn.colorbar(ScalarMappable(_SHARE, "cividis"), ax=list(grid[0]), pad=0.01)
     lines = ["seeds in the true basin (%)", title, *(f"({other})" for other in titles[:1])]
     bar.set_label("\n".join(lines), fontsize=7)

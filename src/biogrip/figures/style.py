@@ -20,7 +20,6 @@ from matplotlib.ticker import LogFormatterSciNotation
 from biogrip.arrays import Array
 from biogrip.digits import SUPERSCRIPTS
 from biogrip.files import atomic_write
-from biogrip.fit.problem import Method
 
 COLUMN_IN, PAGE_IN = 3.5, 7.2
 
@@ -34,17 +33,6 @@ SHADE = "#DCE6EE"
 TARGET, MEASURED, FITTED, PAPER, ALL_SEEDS = BLACK, SKY, ORANGE, GREEN, GREY
 # Of the first run in each basin.
 RUNS = (FITTED, BLUE)
-
-COLORS = {
-    "grey": GREY,
-    "blue": BLUE,
-    "vermilion": ORANGE,
-    "green": GREEN,
-    "sky": SKY,
-    "purple": PURPLE,
-    "amber": "#E69F00",
-}
-"""By the names that methods say them by (`biogrip.fit.problem`)."""
 
 # Most panels that are legible in one row.
 _MOST_SIDE_BY_SIDE, _LEGEND_IN = 5, 0.4
@@ -69,11 +57,6 @@ _STYLE: dict[Any, Any] = {
     "savefig.dpi": 200,
     "pdf.fonttype": 42,
 }
-
-
-def line_of(method: Method) -> dict[str, Any]:
-    """Style of a method's lines for Matplotlib."""
-    return {"color": COLORS[method.color], "linestyle": method.dashes}
 
 
 @contextmanager

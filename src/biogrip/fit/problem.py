@@ -138,7 +138,7 @@ class Method:
     step: str
     """Name of a step of the method, after each of which its history has a row."""
     color: str
-    """Colour of its lines in figures, its own, of `biogrip.figures.style.COLORS`."""
+    """Colour of its lines in figures, its own, of those of `biogrip.figures.style`."""
     dashes: str
     """Their dashes, as Matplotlib has them."""
     sure: bool = False
@@ -148,13 +148,20 @@ class Method:
 METHODS: dict[str, Method] = {
     method.name: method
     for method in (
-        Method("genetic", "genetic algorithm", ("genetic_algorithm",), "generation", "grey", "-"),
+        Method(
+            "genetic",
+            "genetic algorithm",
+            blocks=("genetic_algorithm",),
+            step="generation",
+            color="#999999",
+            dashes="-",
+        ),
         Method(
             "genetic_refined",
             "genetic, polished",
             blocks=("genetic_algorithm", "genetic_refined"),
             step="generation, then local fit",
-            color="vermilion",
+            color="#D55E00",
             dashes="-",
             sure=True,
         ),
@@ -163,7 +170,7 @@ METHODS: dict[str, Method] = {
             "multi-start least squares",
             blocks=("least_squares",),
             step="local fit",
-            color="blue",
+            color="#0072B2",
             dashes="--",
             sure=True,
         ),
@@ -172,7 +179,7 @@ METHODS: dict[str, Method] = {
             "differential evolution",
             blocks=("differential_evolution",),
             step="generation",
-            color="purple",
+            color="#CC79A7",
             dashes="-.",
         ),
     )

@@ -7,7 +7,6 @@ other readings of the paper.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from statistics import NormalDist
 from typing import TYPE_CHECKING, Any
@@ -19,15 +18,7 @@ from biogrip.digits import significant
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.problem import Fit
 from biogrip.physics.sample_model import SINGLE_BRANCH, Parameter, SampleModel
-from biogrip.records.rows import (
-    RowFile,
-    join_arrays,
-    read_arrays,
-    read_object,
-    seeds_of,
-    write_arrays,
-    write_rows,
-)
+from biogrip.records.rows import RowFile, read_arrays, read_object, seeds_of
 from biogrip.study.study import Case
 
 if TYPE_CHECKING:
@@ -95,61 +86,38 @@ def columns(model: SampleModel) -> tuple[str, ...]:
     )
 
 
-@dataclass(frozen=True)
-class Record:
-    """One identification, with case, method and seed."""
-
-    case: str
-    method: str
-    experiment: Experiment
-    seed: int
-    """Seed of the trace."""
-    answer: Fit
-    noise_rms: float | None
-    """RMS of the noise in the trace; None for a recorded trace."""
-
-    def by_column(self, identified: Array) -> dict[str, Any]:
-        """Return identified values, (n_searched, ...), fixed ones, and 0 for missing elements."""
-        of = self.experiment
-        values = {**of.fixed, **dict(zip(of.searched.names, identified, strict=True))}
-        return {p.column: values.get(p.name, 0.0) for p in parameters_in_file(of.model)}
-
-
-def write_identifications(path: Path, records: list[Record]) -> None:
-    """Write one row per seed as CSV.
+def row_of(experiment: Experiment, answer: Fit, noise_rms: float | None) -> tuple[str | int, ...]:
+    """Return what `columns` has of an identification, after case, method and seed.
 
     Numbers have six significant digits: more than a trace determines, and few enough that
-    results on different processors agree.
+    results on different processors agree. The noise of a recorded trace is None.
     """
-    rows = (
-        (
-            *(record.case, record.method, record.seed),
-            *(f"{value:.6g}" for value in record.by_column(record.answer.parameters).values()),
-            f"{record.answer.misfit:.6e}",
-            "" if record.noise_rms is None else f"{record.noise_rms:.6e}",
-            *(record.answer.generations, record.answer.evaluations, record.answer.stop_reason),
-        )
-        for record in records
+    return (
+        *(f"{value:.6g}" for value in _by_column(experiment, answer.parameters).values()),
+        f"{answer.misfit:.6e}",
+        "" if noise_rms is None else f"{noise_rms:.6e}",
+        *(answer.generations, answer.evaluations, answer.stop_reason),
     )
-    write_rows(path, columns(records[0].experiment.model), rows)
 
 
-def write_histories(path: Path, records: list[Record]) -> None:
-    """Write columns of a row per seed and generation as npz, with eight significant digits."""
-    write_arrays(path, join_arrays([_history(record) for record in records]))
+def _by_column(of: Experiment, identified: Array) -> dict[str, Any]:
+    """Return identified values, (n_searched, ...), fixed ones, and 0 for missing elements."""
+    values = {**of.fixed, **dict(zip(of.searched.names, identified, strict=True))}
+    return {p.column: values.get(p.name, 0.0) for p in parameters_in_file(of.model)}
 
 
-def _history(record: Record) -> dict[str, Array]:
-    history = record.answer.history
+def history_of(method: str, seed: int, experiment: Experiment, answer: Fit) -> dict[str, Array]:
+    """Return columns of a row per generation, with eight significant digits."""
+    history = answer.history
     generations = len(history.best_misfit)
     found = {
         "best_misfit": history.best_misfit,
         "median_misfit": history.median_misfit,
-        **record.by_column(history.best_parameters.T),
+        **_by_column(experiment, history.best_parameters.T),
     }
     return {
-        "method": np.full(generations, record.method),
-        "seed": np.full(generations, record.seed),
+        "method": np.full(generations, method),
+        "seed": np.full(generations, seed),
         "generation": np.arange(generations),
         "evaluations": np.asarray(history.evaluations),
         **{
@@ -207,27 +175,28 @@ def basins(found: "pd.DataFrame", tolerance: float) -> "dict[str, pd.DataFrame]"
     return {"near the noise": found[near], "above the noise": found[~near]}
 
 
-def chi_square_increase(found: "pd.DataFrame", samples: int, of: str = "misfit") -> Array:
+def chi_square_increase(found: "pd.DataFrame", case: Case, of: str = "misfit") -> Array:
     """Return the increase of each identification's chi^2 over the lowest of its trace, (n,).
 
-    Identifications of one case by all methods are given, the number of readings in a trace, and the
-    column of misfits. The lowest is that of any method, or that of the true parameters where these
-    are known; the best fit of a few parameters lies below the latter.
+    Identifications by all methods are given, and the column of misfits. The lowest is that of any
+    method, or that of the true parameters where these are known; the best fit of a few parameters
+    lies below the latter.
     """
     misfit = found["misfit"]
     lowest = misfit.groupby(found["seed"]).transform("min")
     lowest = np.fmin(lowest, found["noise_rms"].where(found["noise_rms"] > 0))
-    increase: Array = samples * ((found[of] / lowest) ** 2 - 1).to_numpy(float)
+    increase: Array = len(case.times_s) * ((found[of] / lowest) ** 2 - 1).to_numpy(float)
     return increase
 
 
-def reached_encodable(found: "pd.DataFrame", samples: int, tolerance: float) -> BoolArray:
-    """Return True for each run with chi^2 at most `tolerance` above the best encodable point, (n,).
+def reached_encodable(found: "pd.DataFrame", case: Case) -> BoolArray:
+    """Return True for each run with chi^2 at most a tolerance above the best encodable point, (n,).
 
     Every method can reach this point or lie below it, with digits or without.
     """
     misfit, encodable = (found[name].to_numpy(float) for name in ("misfit", "encodable_misfit"))
-    reached: BoolArray = samples * (misfit**2 - encodable**2) <= tolerance * encodable**2
+    above = len(case.times_s) * (misfit**2 - encodable**2)
+    reached: BoolArray = above <= case.study.optimum_tolerance * encodable**2
     return reached
 
 

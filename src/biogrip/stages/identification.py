@@ -23,11 +23,10 @@ from biogrip.physics.noise import rms, stream
 from biogrip.records.identifications import (
     ENCODABLE,
     MODEL_FITS,
-    Record,
     columns,
+    history_of,
     read_batch,
-    write_histories,
-    write_identifications,
+    row_of,
 )
 from biogrip.records.rows import (
     join_arrays,
@@ -62,7 +61,7 @@ def identify(
     recorded = read_measurements(measurements, list(seeds))
     experiment = experiment_for(case.experiment, recorded, calibrated).to_identify()
     progress = Progress(f"{case.name}, {method}", len(seeds))
-    records = []
+    rows, histories = [], []
     for group in groups(seeds):
         traces = [recorded.readings[seed] for seed in group]
         rngs = [stream(case.study.config.study_seed, case.name, seed, method) for seed in group]
@@ -70,10 +69,11 @@ def identify(
         answers = identified(problems, rngs, progress.within)
         for seed, trace, answer in zip(group, traces, answers, strict=True):
             noise = None if recorded.target is None else rms(trace - recorded.target)
-            records.append(Record(case.name, method, experiment, seed, answer, noise))
+            rows.append((case.name, method, seed, *row_of(experiment, answer, noise)))
+            histories.append(history_of(method, seed, experiment, answer))
         progress.done(len(group))
-    write_identifications(parameters, records)
-    write_histories(history, records)
+    write_rows(parameters, columns(experiment.model), rows)
+    write_arrays(history, join_arrays(histories))
 
 
 def join(

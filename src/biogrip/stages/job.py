@@ -12,6 +12,7 @@ import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stderr
 from dataclasses import MISSING, Field, fields
+from functools import cache
 from inspect import signature
 from pathlib import Path
 from typing import Any, ClassVar, get_type_hints
@@ -46,27 +47,8 @@ class _Named:
         return super().__getattribute__(name)
 
 
-class _NamedOfStudy(_Named, StudyConfig):
-    pass
-
-
-class _NamedOfCase(_Named, CaseBlock):
-    pass
-
-
-class _NamedOfMeasurement(_Named, MeasurementBlock):
-    pass
-
-
-class _NamedOfIdentifiability(_Named, Identifiability):
-    pass
-
-
 # Blocks of which a rule may name single keys.
-_SPLIT: dict[str, tuple[type, type[_Named]]] = {
-    "measurement": (MeasurementBlock, _NamedOfMeasurement),
-    "identifiability": (Identifiability, _NamedOfIdentifiability),
-}
+_SPLIT: dict[str, type] = {"measurement": MeasurementBlock, "identifiability": Identifiability}
 
 
 def settings(study: Study, keys: Iterable[str], case: str = "") -> dict[str, Any]:
@@ -97,8 +79,7 @@ def keys_of_cases(study: Study, *keys: str) -> list[str]:
 
 def case_of(name: str, given: Mapping[str, Any]) -> Case:
     """Return a case of which some keys are given, by `settings`."""
-    study = Study(_NamedOfStudy(_typed(StudyConfig, given)))
-    return Case(name, _NamedOfCase(_typed(CaseBlock, given)), study)
+    return Case(name, _named(CaseBlock, given), Study(_named(StudyConfig, given)))
 
 
 def study_of(given: Mapping[str, Any]) -> Study:
@@ -108,27 +89,29 @@ def study_of(given: Mapping[str, Any]) -> Study:
         if key.startswith("cases."):
             _, name, inner = key.split(".", 2)
             cases.setdefault(name, {})[inner] = value
-    keys = _typed(StudyConfig, given)
-    keys["cases"] = {name: _NamedOfCase(_typed(CaseBlock, own)) for name, own in cases.items()}
-    return Study(_NamedOfStudy(keys))
+    blocks = {name: _named(CaseBlock, own) for name, own in cases.items()}
+    return Study(_named(StudyConfig, given, cases=blocks))
 
 
-def _typed(kind: Any, given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return those of the keys given that a block has; None stands for their default."""
+@cache
+def _class_of(kind: type) -> Any:
+    return type(kind.__name__, (_Named, kind), {})
+
+
+def _named(kind: Any, given: Mapping[str, Any], **keys: Any) -> Any:
+    """Return a block with those of the keys given that it has; None stands for their default."""
     hints = get_type_hints(kind, include_extras=True)
-    keys: dict[str, Any] = {}
     for field in fields(kind):
         above = f"{field.name}."
         inner = {key.removeprefix(above): given[key] for key in given if key.startswith(above)}
         if inner and field.name in _SPLIT:
-            block, named = _SPLIT[field.name]
-            keys[field.name] = named(_typed(block, inner))
+            keys[field.name] = _named(_SPLIT[field.name], inner)
         elif given.get(field.name) is not None:
             keys[field.name] = built(hints[field.name], given[field.name])
         elif field.name in given:
             made = field.default_factory
             keys[field.name] = field.default if made is MISSING else made()
-    return keys
+    return _class_of(kind)(keys)
 
 
 def batch_names(seeds: int, size: int) -> list[str]:

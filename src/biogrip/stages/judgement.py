@@ -108,7 +108,7 @@ def estimate(
     found = read_verdicts(expected)["quantities"]
     determined = {item["quantity"] for item in found if item["verdict"] == DETERMINED}
     every = parameters_and_sum(experiment.searched)
-    selected = [index for index, quantity in enumerate(every) if quantity.label in determined]
+    selected = [quantity for quantity in every if quantity.label in determined]
     rest_known, informed, truth = _rest_known(case, experiment, time_s, rotation)
     often = case.block.identifiability.verdicts_every
     progress = Progress(f"{case.name}, intervals", len(seeds))
@@ -125,20 +125,19 @@ def estimate(
         if len(informed):
             simpler = experiment.of_each(time_s, traces, rest_known)
             known[:, informed] = fit_from(simpler, truth[informed]).x
-        for in_full, shown in ((True, [*range(len(every))]), (False, selected)):
+        for in_full, shown in ((True, every), (False, selected)):
             some = [i for i, seed in enumerate(group) if (seed % often == 0) == in_full]
             if not (some and shown):
                 continue
-            quantities = [every[which] for which in shown]
-            judged = judge_quantities([fits[i] for i in some], quantities, case.confidence)
+            judged = judge_quantities([fits[i] for i in some], shown, case.confidence)
             for i, diagnosis in zip(some, judged, strict=True):
-                for which, finding in zip(shown, diagnosis.findings, strict=True):
-                    given = (finding, known[i]) if which in selected else None
-                    texts = _estimates(every[which], diagnosis.likelihood.best, given)
+                for quantity, finding in zip(shown, diagnosis.findings, strict=True):
+                    given = (finding, known[i]) if quantity in selected else None
+                    texts = _estimates(quantity, diagnosis.likelihood.best, given)
                     ends = finding.low, finding.high
                     limits = ("" if end is None else f"{end:.5g}" for end in ends)
                     verdict = (finding.verdict, *limits) if in_full else ("", "", "")
-                    rows.append((case.name, every[which].label, group[i], *texts, *verdict))
+                    rows.append((case.name, quantity.label, group[i], *texts, *verdict))
         progress.done(len(group))
     INTERVALS.write(intervals, sorted(rows, key=lambda row: row[2]))
 

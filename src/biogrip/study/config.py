@@ -197,16 +197,6 @@ def point_blocks(
     return found
 
 
-def name_complaints(sweeps: Mapping[str, SweepBlock], cases: Iterable[str]) -> Iterator[Complaint]:
-    """Find points that have the names of cases or of other points."""
-    found = {*cases}
-    for sweep, point in list_points(sweeps):
-        if point.name in found:
-            text = f"has the point {point.name}, a name that there is already; allowed is another."
-            yield (sweep,), text
-        found.add(point.name)
-
-
 def _word(value: float | str) -> str:
     text = value if isinstance(value, str) else f"{value:.15g}"
     return re.sub(r"[^A-Za-z0-9-]+", "_", text)
@@ -370,9 +360,14 @@ class StudyConfig(Shared):
             if block is None:
                 yield ("reconstructed", index), f"found '{key}', allowed is a key of this study."
         chosen = [name for name in self.cases if name in (self.only or self.cases)]
-        if (points := len([*list_points(self.sweeps)])) > MOST_POINTS:
-            yield ("sweeps",), f"found {points} points, allowed are {MOST_POINTS} together."
-        yield from below(("sweeps",), name_complaints(self.sweeps, chosen))
+        points, taken = [*list_points(self.sweeps)], {*chosen}
+        if len(points) > MOST_POINTS:
+            yield ("sweeps",), f"found {len(points)} points, allowed are {MOST_POINTS} together."
+        for sweep, point in points:
+            if point.name in taken:
+                text = f"has the point {point.name}, a name that there is already"
+                yield ("sweeps", sweep), f"{text}; allowed is another."
+            taken.add(point.name)
         searched = [p.name for case in self.cases.values() for p in case.searched]
         lists: dict[tuple[str, ...], tuple[Iterable[str], Iterable[str]]] = {
             ("design", "parameters"): (self.design.parameters, dict.fromkeys(searched)),

@@ -7,7 +7,7 @@ under other readings of the paper, are checked as if they were cases of the conf
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, reduce
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,7 @@ from biogrip.physics.models import CANDIDATES, UNPUBLISHED, Published, Sample
 from biogrip.physics.noise import Noise
 from biogrip.physics.protocol import Course, Phase, join_phases, sample_times
 from biogrip.physics.sample_model import Network, with_fixed
-from biogrip.study.case_blocks import CALIBRATED, OVERRIDABLE, CaseBlock
+from biogrip.study.case_blocks import OVERRIDABLE, CaseBlock
 from biogrip.study.config import StudyConfig, list_points, point_blocks
 from biogrip.study.messages import checked, with_numbers
 from biogrip.study.source import (
@@ -138,28 +138,18 @@ class Case:
         closing = self._contact.closing if self._contact else 0.0
         return math.radians(self.study.actuator.stroke_deg) - closing
 
-    @property
-    def is_calibrated(self) -> bool:
-        """True if the identification takes the gripper from a test without sample."""
-        return self.block.assumed_gripper == CALIBRATED
-
     @cached_property
     def sample(self) -> Sample:
         """Constitutive model."""
         return replace(self.block.sample.sample, stiffness=self.instrument.stiffness)
 
     @property
-    def fixed(self) -> dict[str, float]:
-        """Parameters that are not identified, by name."""
-        return {name: float(value) for name, value in self.block.fixed.items()}
-
-    @property
     def parameters(self) -> dict[str, float]:
         """True parameters by name, SI units, branches by relaxation time; none if recorded."""
         given, model = self.block.sample.parameters, self.sample.model
-        known = {name: float(given[name]) for name in model.names if name in given}
+        known = {name: given[name] for name in model.names if name in given}
         whole = len(known) == len(model.names)
-        return with_fixed(model, self.fixed).named_in_order(known) if whole else known
+        return with_fixed(model, self.block.fixed).named_in_order(known) if whole else known
 
     @cached_property
     def network(self) -> Network:
@@ -190,7 +180,7 @@ class Case:
             self.phases,
             ranges,
             self.sample,
-            self.fixed,
+            self.block.fixed,
             self.instrument,
             offset=measurement.fits_offset,
             drift=measurement.fits_drift,
@@ -238,9 +228,9 @@ class Case:
     @property
     def has_valley(self) -> bool:
         """True if two exchangeable parameters are searched, and others besides."""
-        model = self.sample.model
-        pair = [name for name in model.exchangeable if name not in self.fixed]
-        return len(pair) == 2 and len(model.names) - len(self.fixed) > 2
+        searched = [parameter.name for parameter in self.block.searched]
+        pair = {*self.sample.model.exchangeable} & {*searched}
+        return len(pair) == 2 and len(searched) > 2
 
 
 @dataclass(frozen=True)
@@ -304,8 +294,8 @@ class Study:
     @property
     def counted(self) -> list[str]:
         """Names of those of which every trace gets the verdicts that users are shown."""
-        cases = {name: self.cases[name].block for name in self.covered}
-        return [name for name, it in cases.items() if it.identifiability.verdicts_every == 1]
+        covered = self.of(self.covered)
+        return covered._where(lambda case: case.block.identifiability.verdicts_every == 1)
 
     @property
     def published(self) -> list[str]:
@@ -341,24 +331,15 @@ class Study:
         return self.config.protocol.make_phases(GRIPPER, self.actuator)
 
     @property
-    def identifiers(self) -> dict[str, Method]:
-        """Declarations of the methods, by name."""
-        return {name: METHODS[name] for name in self.config.methods}
-
-    @property
-    def shown(self) -> str:
-        """Name of the method that tables and figures of a single method show."""
-        return self.config.methods[0]
-
-    @property
     def shown_method(self) -> Method:
-        """Declaration of the shown method."""
-        return METHODS[self.shown]
+        """Method that tables and figures of a single method show."""
+        return METHODS[self.config.methods[0]]
 
     @property
     def fitting_method(self) -> Method:
         """Least squares if the study has it, else the shown method."""
-        return self.identifiers.get("least_squares", self.shown_method)
+        has_it = "least_squares" in self.config.methods
+        return METHODS["least_squares"] if has_it else self.shown_method
 
 
 _SHOWN = 6
@@ -372,10 +353,7 @@ def default_ranges() -> dict[str, GeneRange]:
 
 def read_configs(files: Iterable[Path]) -> dict[str, Any]:
     """Read config files and merge them, the later over the earlier, see `read_config`."""
-    merged: dict[str, Any] = {}
-    for file in files:
-        merged = overlaid(merged, read_config(file))
-    return merged
+    return reduce(overlaid, map(read_config, files), {})
 
 
 def load_given_study(given: Mapping[str, Any], files: Sequence[Path]) -> Study:

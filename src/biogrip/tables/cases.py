@@ -70,7 +70,7 @@ def write_tables(
 def errors_of_case(case: Case, identifications: Path) -> ShownTable:
     """Compare target and identified values of one case, given its identifications, CSV."""
     tolerance = case.study.near_noise_tolerance
-    found = read_identifications(identifications, case, case.study.shown)
+    found = read_identifications(identifications, case, case.study.shown_method.name)
     of_case: Row = {"case": case.name}
     if found["noise_rms"].notna().all():
         near = share_with_limits(int(near_noise(found, tolerance).sum()), len(found))

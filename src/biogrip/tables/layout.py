@@ -1,4 +1,4 @@
-"""Tables: written as CSV for computing and as HTML for reading; put in other formats; compared.
+"""Tables: written as CSV for computing and as HTML for reading, and put in other formats.
 
 CSV has six significant digits, print as many as a column says, of the number in the CSV.
 """
@@ -7,17 +7,13 @@ import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from difflib import unified_diff
 from html import escape
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from biogrip.digits import counted
-from biogrip.errors import BiogripError
 from biogrip.files import write_text
 from biogrip.records.rows import write_rows
 
@@ -29,7 +25,6 @@ _STYLE = (
     "th,td{padding:.3em .7em;border-bottom:1px solid #ccc;text-align:left}"
     "th{border-bottom:2px solid #333}p{max-width:60em}"
 )
-_MOST_LINES = 40
 _TAG = re.compile("<(?=[A-Za-z/!?])")
 _LATEX = str.maketrans(
     {mark: rf"\{mark}" for mark in "%_&#${}"}
@@ -130,27 +125,3 @@ def _text(cell: Any, digits: int) -> str:
 def _without_bars(text: str) -> str:
     """Escape bars, line ends and tags, which a Markdown table would not show as text."""
     return _TAG.sub("&lt;", " ".join(text.splitlines())).replace("|", r"\|")
-
-
-def compare(published: Path, made: list[Path]) -> None:
-    """Compare tables, CSV and HTML, with those that are published, and print how many agree.
-
-    It is an error, which shows the lines that differ, if one has other bytes or is not published.
-    """
-    if not made:
-        raise BiogripError(f"{published}: holds no tables to compare with.")
-    differing: list[str] = []
-    for table in made:
-        name, now = as_published(table)
-        before = published / name
-        if not before.exists():
-            differing.append(f"{name}: is not published.")
-        elif before.read_bytes() != now.encode():
-            old = before.read_text(encoding="utf-8").splitlines()
-            differing += unified_diff(
-                old, now.splitlines(), str(before), str(table), n=0, lineterm=""
-            )
-    if differing:
-        shown = "\n".join(islice(differing, _MOST_LINES))
-        raise BiogripError(f"the regenerated tables differ from {published}.\n{shown}")
-    print(f"{counted(len(made), 'file')} of tables compared with {published}: the same bytes.")

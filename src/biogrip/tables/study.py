@@ -8,6 +8,7 @@ import pandas as pd
 from scipy.special import betaincinv
 
 from biogrip.fit.nested_fits import aic_and_bic
+from biogrip.fit.problem import METHODS
 from biogrip.judging.levels import WIDE
 from biogrip.judging.likelihood import bound
 from biogrip.judging.quantities import Quantity, parameters_and_sum
@@ -45,22 +46,20 @@ def methods(study: Study, identifications: list[Path]) -> ShownTable:
     labels = {}
     for (name, case), path in zip(study.cases.items(), identifications, strict=True):
         found = read_identifications(path, case)
-        found["increase"] = chi_square_increase(found, len(case.times_s))
-        found["least"] = chi_square_increase(found, len(case.times_s), ENCODABLE)
-        found["reached"] = reached_encodable(found, len(case.times_s), study.optimum_tolerance)
+        found["increase"] = chi_square_increase(found, case)
+        found["least"] = chi_square_increase(found, case, ENCODABLE)
+        found["reached"] = reached_encodable(found, case)
         for method, mine in found.groupby("method", sort=False):
-            share, low, high = share_with_limits(int(mine["reached"].sum()), len(mine))
             row: Row = {
                 "case": name,
-                "method": study.identifiers[method].title,
+                "method": METHODS[method].title,
                 "seeds": len(mine),
-                "reached_share": share,
-                "reached_low": low,
-                "reached_high": high,
                 "median_rise": np.median(mine["increase"]),
                 "encodable_rise": np.median(mine["least"]),
                 "median_evaluations": float(mine["evaluations"].median()),
             }
+            shares = share_with_limits(int(mine["reached"].sum()), len(mine))
+            row |= zip(("reached_share", "reached_low", "reached_high"), shares, strict=True)
             for quantity in case.sample.model.quantities:
                 label = " + ".join(p.name for p in quantity)
                 values = mine[[p.column for p in quantity]].sum(axis=1).to_numpy(float)
@@ -149,15 +148,13 @@ def coverage(
 ) -> ShownTable:
     """Compare estimates and intervals of many seeds with the true values and the bound.
 
-    Targets are files of all cases, in their order; calibrated grippers those of the cases that have
-    one.
+    Targets are files of all cases, in their order; calibrated grippers are named like their case.
     """
-    calibrations = iter(calibrated)
     rows: list[Row] = []
     estimated = pd.concat([read_intervals(study, it) for it in intervals], ignore_index=True)
     for (name, case), target in zip(study.cases.items(), targets, strict=True):
         found = estimated[estimated["case"] == name]
-        own = [next(calibrations)] if case.is_calibrated else []
+        own = [file for file in calibrated if file.stem == name]
         for quantity, limit in bounds_at_truth(case, target, own):
             mine = found[found["quantity"] == quantity.label]
             fitted = mine[mine["estimate_rest_known"].notna()]

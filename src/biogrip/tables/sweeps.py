@@ -13,6 +13,7 @@ import pandas as pd
 
 from biogrip.arrays import Array, BoolArray
 from biogrip.fit.genome import nearest_encodable
+from biogrip.fit.problem import METHODS
 from biogrip.judging.likelihood import bounds_percent, headlines
 from biogrip.judging.quantities import Quantity
 from biogrip.physics.noise import rms
@@ -164,7 +165,8 @@ def write_robustness(study: Study, sweep: str, points: Path, table: Path) -> Non
 
 def robustness(study: Study, name: str, points: Path) -> ShownTable:
     """Join the points of a sweep over all its cases."""
-    sweep, methods = study.config.sweeps[name], study.identifiers
+    sweep = study.config.sweeps[name]
+    methods = [METHODS[method] for method in study.config.methods]
     rows: list[Row] = []
     for case in sweep.cases:
         found = read_points(points, name, case)
@@ -184,9 +186,9 @@ def robustness(study: Study, name: str, points: Path) -> ShownTable:
                 rows.append(
                     head
                     | {
-                        f"{ours}_{method}": float(by_method.loc[method, theirs])
+                        f"{ours}_{it.name}": float(by_method.loc[it.name, theirs])
                         for theirs, (ours, _) in _BY_METHOD.items()
-                        for method in methods
+                        for it in methods
                     }
                 )
     words = near_noise_words(study.near_noise_tolerance)
@@ -196,9 +198,9 @@ def robustness(study: Study, name: str, points: Path) -> ShownTable:
         Column("column", _title(study, sweep.columns)),
         Column("quantity", "Quantity"),
         *(
-            Column(f"{ours}_{method}", f"{heading.format(near_noise=words)}, {it.title}", 2)
+            Column(f"{ours}_{it.name}", f"{heading.format(near_noise=words)}, {it.title}", 2)
             for ours, heading in _BY_METHOD.values()
-            for method, it in methods.items()
+            for it in methods
         ),
         Column("bound_percent", "Bound, rest known %", 2),
     )

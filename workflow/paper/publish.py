@@ -2,11 +2,15 @@
 
 import shutil
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from biogrip.errors import BiogripError
 from biogrip.files import write_text
 from biogrip.stages.job import logged, paths
 from biogrip.tables.layout import as_published
+
+if TYPE_CHECKING:
+    snakemake: Any
 
 with logged(snakemake):
     published = Path(snakemake.params.published)
