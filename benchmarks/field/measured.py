@@ -51,7 +51,7 @@ def _recorded(name: str) -> tuple[Recording, Experiment]:
     files = [ROOT / file for file in CONFIGS]
     case = load_study(read_configs(files), files).cases[name]
     file = ROOT / f"data/measured/{name}.csv"
-    return prepare(read_recording(file, case.columns), case.experiment)
+    return prepare(read_recording(file, case.block.measurement), case.experiment)
 
 
 @dataclass(frozen=True)

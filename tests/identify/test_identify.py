@@ -16,8 +16,8 @@ from biogrip.library import INSTRUMENTS, BiogripError, Sample, hold, set_up
 from biogrip.stages.judgement import judge
 from biogrip.stages.targets import record
 from biogrip.study.source import overlaid
-from biogrip.traces.columns import Columns
 from biogrip.traces.reader import Recording, recording_of_arrays
+from tests.helpers.columns import columns_of
 from tests.helpers.default import study_of
 from tests.helpers.identified import identified, write_trace
 
@@ -26,11 +26,10 @@ SECONDS = np.arange(4.0, 600.0, 4.0)
 SCATTER = 5e-5 * np.random.default_rng(3).standard_normal(len(SECONDS))
 # A soft tissue under 100 Pa: as its own equation has it, J = 1/k_s + (1 - exp(-t k_v/c_v))/k_v.
 STRAIN = 100 * (1 / 5e4 + (1 - np.exp(-SECONDS / 100)) / 2e4) + SCATTER
-STRAINS = Columns("time_s", "strain", quantity=INSTRUMENTS["strain"].read)
 
 
 def recorded(*, strain: Array = STRAIN, time_s: Array = SECONDS, **more: Any) -> Recording:
-    return recording_of_arrays(Columns(**{**vars(STRAINS), **more}), time_s, strain)
+    return recording_of_arrays(columns_of("time_s", "strain", "strain", **more), time_s, strain)
 
 
 FEW = {

@@ -16,11 +16,12 @@ from biogrip.identify.data import trace_data
 from biogrip.identify.identify import identify
 from biogrip.identify.load_noise import smoothed
 from biogrip.identify.prepare import _noise, prepare
-from biogrip.physics.instruments import CONTROLLED, INSTRUMENTS
+from biogrip.physics.instruments import CONTROLLED
 from biogrip.physics.protocol import evaluate
 from biogrip.study.source import HOLD
-from biogrip.traces.columns import Columns, held_unit
+from biogrip.traces.columns import held_unit
 from biogrip.traces.reader import read_recording
+from tests.helpers.columns import columns_of
 from tests.helpers.default import seen
 from tests.helpers.identified import write_trace
 
@@ -59,7 +60,7 @@ def test_readings_beside_the_record_of_the_load_are_gaps(tmp_path: Path) -> None
     there = {*range(3, 10), *range(12, 17)}
     rows = [f"{i},{5 if i in there else ''},{i}" for i in range(20)]
     (path := tmp_path / "t.csv").write_text("\n".join(["time_s,stress_Pa,strain", *rows]))
-    columns = Columns("time_s", "strain", quantity=INSTRUMENTS["strain"].read, load="stress_Pa")
+    columns = columns_of("time_s", "strain", "strain", load="stress_Pa")
     recorded = read_recording(path, columns)
     assert (recorded.time_s.tolist(), recorded.gaps) == ([*range(3, 17)], 6)
 
@@ -264,8 +265,8 @@ def test_a_column_of_the_load_is_the_protocol_of_all_rows(tmp_path: Path, start_
     np.testing.assert_allclose(evaluate(history, EVEN), 5e-6 * load_at(EVEN), atol=1e-15)
     assert len(history.steps_s) == 0
     assert len(history.time_s) < 300
-    assert case.columns.start_s == (start_s or None)
-    found = read_recording(asked.trace, case.columns)
+    assert case.block.measurement.start_s == (start_s or None)
+    found = read_recording(asked.trace, case.block.measurement)
     dwell = (EVEN >= 8) & (EVEN < 50)
     np.testing.assert_allclose(found.time_s, EVEN[dwell] + start_s)
     assert found.form["others"] == np.count_nonzero(~dwell)

@@ -17,34 +17,29 @@ from biogrip.physics.instruments import (
     COMPLIANCE,
     DISPLACEMENT,
     FORCE,
-    INSTRUMENTS,
     MODULUS,
     ROTATION,
     STRAIN,
     TORQUE,
 )
-from biogrip.traces.columns import TIME_UNITS, Columns, unit_of
+from biogrip.traces.columns import TIME_UNITS, unit_of
+from biogrip.traces.measurement_block import MeasurementBlock
 from biogrip.traces.reader import read_recording
+from tests.helpers.columns import columns_of
 
 FILES = Path(__file__).with_name("files")
 KEPT: list[dict[str, Any]] = yaml.safe_load((FILES / "files.yaml").read_text(encoding="utf-8"))
-PLAIN = Columns("time_s", "rotation_rad")
+PLAIN = columns_of()
 PLAIN_FORM = {"encoding": "UTF-8", "separator": "commas", "decimal": "point", "header_line": 1}
 PLAIN_FORM |= {"rows": 12, "gaps": 0, "first_s": 0.0, "last_s": 11.0}
 ROWS = tuple(f"{i},{i}e-6" for i in range(12))
-
-
-def columns_of(given: dict[str, Any]) -> Columns:
-    quantity = INSTRUMENTS[given.get("quantity", "rotation")].read
-    usual = {"time": "time_s", "reading": "rotation_rad"}
-    return Columns(**{**usual, **given, "quantity": quantity})
 
 
 def first_last_sum(values: Any) -> list[float]:
     return [values[0], values[-1], values.sum()]
 
 
-def refusal(path: Path, columns: Columns = PLAIN) -> str:
+def refusal(path: Path, columns: MeasurementBlock = PLAIN) -> str:
     with pytest.raises(BiogripError) as error:
         read_recording(path, columns)
     return str(error.value)
@@ -56,7 +51,7 @@ def test_a_kept_file_is_read_or_refused_as_its_table_says(
 ) -> None:
     """The numbers are those of a reader by the csv module, from before pandas read the files."""
     monkeypatch.chdir(FILES)
-    path, columns = Path(kept.get("file", "plain.csv")), columns_of(kept.get("columns", {}))
+    path, columns = Path(kept.get("file", "plain.csv")), columns_of(**kept.get("columns", {}))
     if "lines" in kept or "text" in kept:
         lines = path.read_bytes().decode("latin-1").splitlines()
         for number, line in kept.get("lines", {}).items():
@@ -138,7 +133,7 @@ def test_what_pandas_writes_is_read_to_the_last_bit(
         lines.insert(int(rng.integers(len(lines) + 1)), line)
     mark = BOM_UTF16_BE if encoding == "utf-16-be" else b""
     path.write_bytes(mark + "".join(line + line_end for line in lines).encode(encoding))
-    found = read_recording(path, Columns("time_s", "angle, left (urad)"))
+    found = read_recording(path, columns_of(reading="angle, left (urad)"))
     assert found.form["encoding"] == ENCODINGS[encoding]
     np.testing.assert_array_equal(found.time_s, times)
     np.testing.assert_array_equal(found.readings, np.array(values) * 1e-6)
@@ -238,13 +233,13 @@ def test_of_a_file_without_the_columns_the_names_above_numbers_are_said(tmp_path
     assert "The file has: seconds, twist." in refusal(path)
 
 
-@pytest.mark.parametrize("sd", [{"sd": "sd"}, {}])
-def test_readings_of_equal_times_are_averaged(tmp_path: Path, sd: dict[str, str]) -> None:
+@pytest.mark.parametrize("sd", ["sd", None])
+def test_readings_of_equal_times_are_averaged(tmp_path: Path, sd: str | None) -> None:
     rng = np.random.default_rng(1)
     frame = pd.DataFrame({"time_s": np.repeat(np.arange(15), rng.integers(1, 5, 15))})
     frame["rotation_rad"], frame["sd"] = rng.uniform(1, 2, (2, len(frame)))
     frame.to_csv(tmp_path / "t.csv", index=False)
-    found = read_recording(tmp_path / "t.csv", columns_of({**sd, "average_repeated": True}))
+    found = read_recording(tmp_path / "t.csv", columns_of(sd=sd, average_repeated=True))
     groups = frame.groupby("time_s")
     counts = groups.size()
     np.testing.assert_array_equal(found.time_s, np.arange(15))
@@ -309,7 +304,7 @@ def test_a_table_has_one_decimal_mark(
     path, rows = tmp_path / "t.csv", range(11, 31)
     lines = [separator.join((time, reading)).format(i=i) for i in rows]
     path.write_text("\n".join([f"t_s{separator}G_Pa", *lines]), encoding="utf-8")
-    columns = Columns("t_s", "G_Pa", quantity=MODULUS)
+    columns = columns_of("t_s", "G_Pa", "modulus")
     if right is None:
         found = reading.format(i=11), time.format(i=11)
         assert "line 2, column 'G_Pa': found '{}' beside '{}'".format(*found) in refusal(
@@ -323,7 +318,7 @@ def test_a_table_has_one_decimal_mark(
 
 
 def test_a_clock_goes_on_after_midnight_and_after_a_change_of_its_zone(tmp_path: Path) -> None:
-    path, columns = tmp_path / "t.csv", Columns("t", "G_Pa", quantity=MODULUS)
+    path, columns = tmp_path / "t.csv", columns_of("t", "G_Pa", "modulus")
     minutes = (*range(50, 60), *range(10))
     times = [f"{23 if m > 9 else 0:02}:{m:02}:00" for m in minutes]
     for midnight in ("00:00:00", "-"):
@@ -349,7 +344,7 @@ def test_a_clock_goes_on_after_midnight_and_after_a_change_of_its_zone(tmp_path:
 def test_times_of_another_form_are_named(tmp_path: Path, cell: str) -> None:
     path = tmp_path / "t.csv"
     path.write_text("\n".join(["t,G_Pa", *(f"{cell},{i}" for i in range(12))]))
-    said = refusal(path, Columns("t", "G_Pa", quantity=MODULUS))
+    said = refusal(path, columns_of("t", "G_Pa", "modulus"))
     assert f"line 2, column 't': found '{cell}'; allowed are numbers, or hh:mm:ss" in said
 
 
@@ -360,6 +355,6 @@ def test_a_mark_that_may_be_between_thousands_is_said(
     path = tmp_path / "t.csv"
     rows = (f"{i}{separator}{cell}" for i in range(12))
     path.write_text("\n".join([f"t_s{separator}G_Pa", *rows]))
-    recorded = read_recording(path, Columns("t_s", "G_Pa", quantity=MODULUS))
+    recorded = read_recording(path, columns_of("t_s", "G_Pa", "modulus"))
     assert recorded.readings[0] == 5.845
     assert f"of {cell} is read as a decimal mark; where it is between" in recorded.remarks()[0]

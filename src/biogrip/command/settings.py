@@ -34,7 +34,6 @@ from biogrip.identify.other_fits import Trace
 from biogrip.physics.instruments import GRIPPER, INSTRUMENTS, Instrument
 from biogrip.physics.models import ALIASES, CANDIDATES
 from biogrip.study.experiment_blocks import LONGEST_S, SHORTEST_S
-from biogrip.study.measurement_block import ARRAYS, READINGS, MeasurementBlock
 from biogrip.study.messages import checked, with_numbers
 from biogrip.study.source import (
     HOLD,
@@ -49,13 +48,13 @@ from biogrip.study.source import (
 from biogrip.study.study import Case, load_study, read_configs
 from biogrip.terminal import visible
 from biogrip.traces.columns import (
-    Columns,
     held_unit,
     listed,
     number_and_unit,
     place,
     trace_file_problem,
 )
+from biogrip.traces.measurement_block import ARRAYS, READINGS, ByOptions, MeasurementBlock
 from biogrip.traces.reader import Recording, read_recording, recording_of_arrays
 
 MODEL = "generalized_maxwell"
@@ -144,7 +143,7 @@ class Asked:
         renamed = {_BY_SPHERE.get(key, key): value for key, value in measured.items()}
         return {**blocks, "measurement": renamed}
 
-    def read(self, columns: Columns) -> Recording:
+    def read(self, columns: MeasurementBlock) -> Recording:
         """Read the trace; a `BiogripError` has file, line and column, or array and index."""
         if self.arrays:
             return recording_of_arrays(columns, *self.arrays)
@@ -182,7 +181,7 @@ def read_trace(asked: Asked) -> tuple[Recording, Case]:
     A `BiogripError` has file, line and column, or setting, that cannot be used.
     """
     case, recording = case_of(asked)
-    columns = replace(case.columns, by_options=True)
+    columns = ByOptions(**vars(case.block.measurement))
     # What its protocol follows from was read before the protocol's start was known.
     recording = replace(recording, read=columns) if recording else asked.read(columns)
     return replace(recording, remarks_before=remarks_on_hold(recording, case, asked.given)), case
@@ -261,7 +260,7 @@ def _with_instrument(
     measurement = with_numbers(MeasurementBlock, measurement)
     kind = given.get("instrument", instrument.kind)
     block = checked(MeasurementBlock, measurement)[0]
-    controlled = instrument.controlled if block is None else block.columns.controlled
+    controlled = (instrument if block is None else block.instrument).controlled
     found = {**merged, "instrument": kind, "measurement": measurement}
     of_column = measurement.get(LOAD[-1]) is not None
     if instrument.sweeps:
@@ -286,7 +285,7 @@ def _with_instrument(
     own = None
     # Whoever uses the trace says what is wrong.
     with suppress(BiogripError):
-        own = asked.read(block.columns) if block else None
+        own = asked.read(block) if block else None
     phase = {"duration_s": 1.0, controlled.column: 1.0 if level is None else level}
     record, start_s = None, measurement.get("start_s")
     if own is not None and own.load is not None:
@@ -549,8 +548,12 @@ def load_in_words(trace: Trace, case: Case, given: Mapping[str, Any]) -> str:
 
     Given are the blocks of the config that the user has set.
     """
-    (recording, experiment), controlled = trace, case.columns.controlled
-    form, start_s = recording.form, case.columns.start_s or 0.0
+    (recording, experiment), measured = trace, case.block.measurement
+    controlled, form, start_s = (
+        measured.instrument.controlled,
+        recording.form,
+        measured.start_s or 0.0,
+    )
     if recording.load is not None and experiment.record is not None:
         column, loads = form["columns"]["load"], experiment.record[:, 1]
         if case.instrument.relative:
@@ -577,7 +580,7 @@ def _contact(case: Case) -> str:
 
 def _shrinks(recording: Recording, case: Case) -> tuple[str, ...]:
     """Return a sentence if a sphere was drawn back, where Hertz's contact has no such sum."""
-    if recording.load is None or case.columns.sphere_m is None:
+    if recording.load is None or case.block.measurement.sphere is None:
         return ()
     time_s, loads = recording.load[recording.load[:, 0] <= recording.form["last_s"]].T
     most = np.maximum.accumulate(loads)

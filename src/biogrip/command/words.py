@@ -13,8 +13,8 @@ from biogrip.judging.verdicts import FIT_REJECTED, NOT_DETERMINED
 from biogrip.judging.without_model import BEYOND, EXPONENT, FLOW, LEVEL, LOSS
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.models import CANDIDATES
-from biogrip.study.measurement_block import KNOWN_NOISE
 from biogrip.terminal import aligned, visible, visible_lines
+from biogrip.traces.measurement_block import KNOWN_NOISE
 
 # Instrument whose readings span decades: their misfit is told over their noise.
 _SWEEPS = "oscillation"

@@ -35,9 +35,9 @@ from biogrip.study.experiment_blocks import (
     SampleBlock,
     fixed_complaints,
 )
-from biogrip.study.measurement_block import MeasurementBlock
 from biogrip.study.messages import checked
 from biogrip.study.source import overlaid
+from biogrip.traces.measurement_block import MeasurementBlock
 
 CALIBRATED = "calibrated"
 

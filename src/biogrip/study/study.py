@@ -37,7 +37,6 @@ from biogrip.study.source import (
     read_source,
     values_in,
 )
-from biogrip.traces.columns import Columns
 
 
 @dataclass(frozen=True)
@@ -97,11 +96,6 @@ class Case:
     def times_s(self) -> Array:
         """Times of a simulated trace, (n_samples,)."""
         return sample_times(self.torque.end_s, self.block.measurement.rate_Hz)
-
-    @property
-    def columns(self) -> Columns:
-        """Columns of a recorded trace's file."""
-        return self.block.measurement.columns
 
     @property
     def instrument(self) -> Instrument:

@@ -7,7 +7,7 @@ with the sample is the same for both.
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from pydantic import BeforeValidator, Field, Tag
 
@@ -18,6 +18,7 @@ from biogrip.physics.instruments import (
     ROTATION,
     STRAIN,
     STRESS,
+    Channel,
     Instrument,
     under_sphere,
 )
@@ -25,7 +26,6 @@ from biogrip.physics.noise import Noise
 from biogrip.traces.columns import (
     AXES,
     TIME_UNITS,
-    Columns,
     known_unit,
     length_m,
     trace_file_problem,
@@ -47,6 +47,19 @@ _SWEPT = tuple(name for name, instrument in INSTRUMENTS.items() if instrument.sw
 _OF_SWEEPS = ("frequency", "frequency_unit", *PARTNERS, "partner_unit", "loss_sd")
 # Keys of simulated traces, too; the others are of a file.
 _OF_ALL = {"rate_Hz", "file", "noise", "noise_model", "offset", "drift"}
+# Keys that no option of the command sets but `--set`, with what they may say.
+_BY_SET = {
+    "time_unit": "UNIT",
+    "frequency_unit": "UNIT",
+    "partner_unit": "UNIT",
+    "loss_sd": "COLUMN",
+    "rotation_unit": "UNIT",
+    "reading_unit": "UNIT",
+    "load_unit": "UNIT",
+    "block": "N",
+    "average_repeated": "true",
+    "scale": "-1",
+}
 
 
 def _unit(allowed: Mapping[str, float]) -> BeforeValidator:
@@ -173,40 +186,58 @@ class MeasurementBlock(Block):
     or not, then fits an offset and a drift along, unless they are false. By default white."""
     noise: Noise
 
+    by_options: ClassVar[bool] = False
+    """False if keys of the config say all; used in messages."""
+
     @property
     def coloured(self) -> bool:
         """True if the noise model is more than white noise."""
         return self.noise_model == COLOURED
 
     @property
-    def columns(self) -> Columns:
-        """Columns of a recorded trace's file."""
-        (name,) = self.readings
-        axis = self.frequency if INSTRUMENTS[name].sweeps else self.time
-        assert axis is not None
-        partner = next((it for it in INSTRUMENTS[name].partners if getattr(self, it.name)), None)
-        same = (
-            *("start_s", "sd", "block", "average_repeated", "from_s", "until_s"),
-            *("rows", "load", "load_unit", "partner_unit", "loss_sd"),
-        )
-        return Columns(
-            axis,
-            getattr(self, name),
-            time_unit=self.time_unit or self.frequency_unit,
-            partner=partner,
-            partner_column=getattr(self, partner.name) if partner else "",
-            reading_unit=self.rotation_unit or self.reading_unit,
-            scale=1.0 if self.scale is None else self.scale,
-            quantity=self.instrument.read,
-            sphere_m=length_m(self.sphere or ""),
-            **{key: getattr(self, key) for key in same},
-        )
-
-    @property
     def instrument(self) -> Instrument:
         """The instrument of a recorded trace, with the units that its columns may have."""
         instrument, radius_m = INSTRUMENTS[self.readings[0]], length_m(self.sphere or "")
         return under_sphere(instrument, radius_m) if radius_m else instrument
+
+    @property
+    def partner(self) -> Channel | None:
+        """What a sweep reads beside another modulus."""
+        return next((it for it in self.instrument.partners if getattr(self, it.name)), None)
+
+    @property
+    def axis(self) -> str:
+        """What readings follow: a key of `AXES`."""
+        return "frequency" if self.instrument.sweeps else "time"
+
+    @property
+    def named(self) -> dict[str, str]:
+        """Names of a file's columns by the key that says them, in the order of reading."""
+        partner = [self.partner.name] if self.partner else []
+        keys = (self.axis, self.readings[0], *partner, "sd", "loss_sd", "load")
+        return {key: name for key in keys if (name := getattr(self, key)) is not None}
+
+    @property
+    def axis_column(self) -> str:
+        """Name of the column of times, or of a sweep's frequencies."""
+        return self.named[self.axis]
+
+    @property
+    def reading_column(self) -> str:
+        """Name of that of what the instrument reads."""
+        return self.named[self.readings[0]]
+
+    @property
+    def factor(self) -> float:
+        """Scale of the numbers in the column of the readings."""
+        return 1.0 if self.scale is None else self.scale
+
+    def said_by(self, *keys: str) -> str:
+        """Return the options or config keys that say something, for messages."""
+        if self.by_options:
+            return " and ".join(map(_option, keys))
+        values = [f"{key}: {_BY_SET.get(key, 'UNIT')}".removesuffix(": UNIT") for key in keys]
+        return f"{' and '.join(values)} under measurement"
 
     @property
     def readings(self) -> list[str]:
@@ -299,3 +330,21 @@ class MeasurementBlock(Block):
             unit = getattr(self, key)
             if unit is not None and known_unit(unit, of.units) is None:
                 yield (key,), f"found '{unit}', allowed are {', '.join(of.units)}."
+
+
+UNREAD = MeasurementBlock(rate_Hz=1.0, noise=Noise("gaussian", 0.0, "peak"))
+"""What a recording of no file was read by."""
+
+
+class ByOptions(MeasurementBlock):
+    """A measurement whose keys are set by options of the command, as messages then say."""
+
+    by_options = True
+
+
+def _option(key: str) -> str:
+    if key in _BY_SET:
+        return f"--set measurement.{key}={_BY_SET[key]}"
+    if key in PARTNERS:
+        return f"--reading {key}=COLUMN"
+    return "--reading" if key in INSTRUMENTS else f"--{key}"
