@@ -39,6 +39,7 @@ from biogrip.command.settings import (
 from biogrip.command.words import in_columns, in_words
 from biogrip.errors import BiogripError
 from biogrip.files import digest_of, software
+from biogrip.fit.experiment import Experiment
 from biogrip.fit.genome import SearchRange
 from biogrip.identify.data import trace_data
 from biogrip.identify.identify import STEPS, budget, identify_alike
@@ -350,9 +351,7 @@ def data_of(
 
     Given are the blocks of the config that the user has set.
     """
-    recording, experiment = diagnosis.recording, diagnosis.experiment
-    assert recording
-    assert experiment
+    recording, experiment = diagnosis.identified
     load = load_in_words((recording, experiment), case, given)
     tried = diagnosis.models.answers if diagnosis.models else ()
     return {
@@ -362,7 +361,7 @@ def data_of(
         **({"load": load} if load else {}),
         **trace_data(diagnosis),
         "without_model": diagnosis.without_model(case.block.identifiability.at_s).data(),
-        "assumed": _assumed(diagnosis, case, list(tried or case.models)),
+        "assumed": _assumed(experiment, case, list(tried or case.models)),
         # What the user does not set; uncertainties are no gripper.
         "by_default": [
             name
@@ -373,10 +372,8 @@ def data_of(
     }
 
 
-def _assumed(diagnosis: Diagnosis, case: Case, tried: Sequence[str]) -> dict[str, Any]:
+def _assumed(found: Experiment, case: Case, tried: Sequence[str]) -> dict[str, Any]:
     """Return what an identification relies on: its model, and a config that repeats it."""
-    found = diagnosis.experiment
-    assert found
     asked = case.block.identifiability
     blocks = ["instrument", "protocol", "search_range", "measurement", "models", "least_squares"]
     blocks += ["gripper"] if case.instrument.has_jaws else []

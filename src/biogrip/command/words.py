@@ -351,9 +351,9 @@ def set_up_in_words(found: Mapping[str, Any]) -> list[str]:
 
 def preferred_in_words(found: Mapping[str, Any]) -> list[str]:
     """Return a sentence on the model that is preferred to that of the fit, if one is."""
-    lowest = min(found["models"] or [], key=lambda row: row["delta_bic"], default=None)
-    if not found["preferred_model"] or lowest is None:
+    if not found["preferred_model"]:
         return []
+    lowest = min(found["models"], key=lambda row: row["delta_bic"])
     count = len(found["models"]) + len(found["models_spared"])
     return [
         f"Of {count} models that were compared, that of the lowest BIC is another: "

@@ -93,7 +93,9 @@ def unit_of(
     which of name, cell and statement contradict each other.
     """
     where, choices = place(path, column=column), ", ".join(allowed)
-    at_end, in_row = _unit_at_end(column, allowed), unit_in_cell(below, allowed)
+    # A name may end with something other than a unit, as in rotation_left or phi (2).
+    ends = (known_unit(end, allowed) for end in _endings(column, *_SURELY, *_PERHAPS))
+    at_end, in_row = next(filter(None, ends), None), unit_in_cell(below, allowed)
     unit = (at_end or in_row) if given is None else known_unit(given, allowed)
     if given is not None and unit is None:
         raise BiogripError(f"{where}: found the unit '{given}', allowed are {choices}.")
@@ -196,12 +198,6 @@ def _endings(column: str, *patterns: str) -> list[str]:
     name = re.sub(r"_per_([^\W_]+)$", r" 1/\1", plain_name(column))
     found = filter(None, (re.search(pattern, name) for pattern in patterns))
     return ["".join(filter(None, match.groups())).strip() for match in found]
-
-
-def _unit_at_end(column: str, allowed: Collection[str]) -> str | None:
-    # A name may end with something other than a unit, as in rotation_left or phi (2).
-    ends = _endings(column, *_SURELY, *_PERHAPS)
-    return next(filter(None, (known_unit(end, allowed) for end in ends)), None)
 
 
 def _said_at_end(column: str) -> str | None:

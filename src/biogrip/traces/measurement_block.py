@@ -32,7 +32,6 @@ from biogrip.traces.columns import (
 )
 
 COLOURED = "coloured"
-NOISE_MODELS = ("white", COLOURED)
 KNOWN_NOISE = ("noise_rad", "sd", "noise_share")
 """Keys that say how large the noise is."""
 
@@ -179,7 +178,7 @@ class MeasurementBlock(Block):
     drift: bool | None = None
     """If true, fit a linear drift of the instrument along. By default only with a coloured noise
     model; false where the instrument is known not to drift, and the sample may flow."""
-    noise_model: Annotated[str | None, OneOf(NOISE_MODELS)] = None
+    noise_model: Annotated[str | None, OneOf(("white", COLOURED))] = None
     """Model of the noise when a trace is judged. `white`: samples are independent; `coloured`:
     noise may be autocorrelated (AR(1), 1/f, a random walk) and grow with the rotation, and outliers
     are left out, so that intervals are wider and keep their coverage; every identification, judged
@@ -245,20 +244,10 @@ class MeasurementBlock(Block):
         return [name for name in READINGS if getattr(self, name) is not None]
 
     @property
-    def undeclared(self) -> frozenset[str]:
-        """Which of offset and drift nothing is said of."""
+    def along(self) -> dict[str, bool]:
+        """True for offset and drift as far as they are fitted along."""
         said = {"offset": self.offset, "drift": self.drift}
-        return frozenset(name for name, declared in said.items() if declared is None)
-
-    @property
-    def fits_offset(self) -> bool:
-        """True if a constant offset is fitted along."""
-        return self.coloured if self.offset is None else self.offset
-
-    @property
-    def fits_drift(self) -> bool:
-        """True if a linear drift is fitted along."""
-        return self.coloured if self.drift is None else self.drift
+        return {name: self.coloured if it is None else it for name, it in said.items()}
 
     def complaints(self) -> Iterator[Complaint]:
         """Find keys that are in conflict, and what a recorded trace lacks."""
