@@ -549,13 +549,9 @@ def load_in_words(trace: Trace, case: Case, given: Mapping[str, Any]) -> str:
     Given are the blocks of the config that the user has set.
     """
     (recording, experiment), measured = trace, case.block.measurement
-    controlled, form, start_s = (
-        measured.instrument.controlled,
-        recording.form,
-        measured.start_s or 0.0,
-    )
+    controlled, start_s = measured.instrument.controlled, measured.start_s or 0.0
     if recording.load is not None and experiment.record is not None:
-        column, loads = form["columns"]["load"], experiment.record[:, 1]
+        column, loads = recording.form["columns"]["load"], experiment.record[:, 1]
         if case.instrument.relative:
             loads = loads * getattr(case.block.protocol.phases[0], controlled.column)
         ends = loads.min(), loads.max()
@@ -568,7 +564,7 @@ def load_in_words(trace: Trace, case: Case, given: Mapping[str, Any]) -> str:
         return ""
     number, unit = held_unit(given[HOLD[0]], controlled)
     start = "its start, as fitted," if experiment.fit_start else f"{start_s:g} s"
-    what = f"{_with_unit(f'{number:g}', unit)} from {start} to {form['last_s']:g} s"
+    what = f"{_with_unit(f'{number:g}', unit)} from {start} to {recording.form['last_s']:g} s"
     return f"Held: {what}{_contact(case)}."
 
 

@@ -80,14 +80,12 @@ class Recording:
     """Times by the clock of readings that were left out where a sample may jump."""
     load_noise: float = 0.0
     """Standard deviation of what was smoothed out of `load`, as a share of its largest value."""
-    suspicion: str | None = None
-    """Sentence on a reading that is hardly plausible."""
     form: Mapping[str, Any] = field(default_factory=dict)
     """What was recognised in the file, for people to check before they believe a fit; `read_as` of
     the JSON file."""
     remarks_before: tuple[str, ...] = ()
-    """Sentences that come before: of an earlier reading, where `form` is lost, or on what was
-    held."""
+    """Sentences that come before: of an earlier reading, where `form` is lost, on what was held, or
+    on a reading that is hardly plausible."""
     load: Array | None = None
     """Times and loads, or deformations, in SI units, (n, 2), where they are read: of all rows, used
     or not."""
@@ -115,17 +113,17 @@ class Recording:
 
     def remarks(self) -> list[str]:
         """Return sentences on what was left out, and on what is hardly plausible."""
-        said = [*self.remarks_before, *filter(None, [self.suspicion])]
+        said = [*self.remarks_before]
         if self.gaps:
             rows = f"{counted(self.gaps, 'row')} of {len(self.time_s) + self.gaps}"
             said.append(f"Left out for want of a number: {rows}.")
         form = self.form
-        if "averaged" in form:
+        if form.get("averaged"):
             axis = _PLURALS[self.read.axis]
             said.append(f"Averaged at repeated {axis}: {counted(form['averaged'], 'reading')}.")
-        if "outside" in form:
+        if form.get("outside"):
             said.append(f"Left out by from_s and until_s: {counted(form['outside'], 'reading')}.")
-        if "others" in form:
+        if form.get("others"):
             said.append(f"Left out, for rows asks for others: {counted(form['others'], 'row')}.")
         if self.load_noise:
             said.append(
@@ -208,6 +206,7 @@ def read_recording(path: Path, columns: MeasurementBlock) -> Recording:
         {"column": table.names[i], "unit": unit} for i, unit in zip(indices, units, strict=True)
     )
     several = len(tables) > 1
+    found = _checked(path, columns, units, values[chosen], lines[chosen])
     form = {
         "encoding": sheet.encoding,
         "separator": _SEPARATORS[sheet.separator],
@@ -218,14 +217,11 @@ def read_recording(path: Path, columns: MeasurementBlock) -> Recording:
         "blocks": len(tables) if several else None,
         "preamble": table.title or None,
         "columns": dict(zip(columns.named, names_and_units, strict=True)),
+        "rows": len(values),
+        **found.form,
+        "others": int(np.count_nonzero(~chosen)) or None,
     }
-    others = int(np.count_nonzero(~chosen)) or None
-    form |= {"rows": len(values), "gaps": None, "averaged": None, "outside": None, "others": others}
-    found = _checked(path, columns, units, values[chosen], lines[chosen])
-    form |= found.form
-    return replace(
-        found, form={key: value for key, value in form.items() if value is not None}, load=load
-    )
+    return replace(found, form={key: it for key, it in form.items() if it is not None}, load=load)
 
 
 def recording_of_arrays(columns: MeasurementBlock, *arrays: Array) -> Recording:
@@ -284,6 +280,7 @@ def _checked(
         "gaps": without_number,
         "averaged": averaged or None,
         "outside": int(np.count_nonzero(~used)) or None,
+        "others": None,
         f"first_{end}": float(time_s[0]),
         f"last_{end}": float(time_s[-1]),
     }
@@ -305,7 +302,7 @@ def _checked(
         (units[0], units[1]),
         sd=sd,
         gaps=without_number,
-        form={key: value for key, value in form.items() if value is not None},
+        form=form,
     )
 
 
