@@ -124,11 +124,10 @@ def read_result(path: Path, made_from: str) -> dict[str, Any]:
 
 
 def _renamed(data: Any, names: Mapping[str, str]) -> Any:
-    if isinstance(data, list):
-        return [_renamed(each, names) for each in data]
-    if not isinstance(data, dict):
-        return data
-    return {names.get(key, key): _renamed(each, names) for key, each in data.items()}
+    def renamed(own: dict[str, Any]) -> dict[str, Any]:
+        return {names.get(key, key): each for key, each in own.items()}
+
+    return json.loads(json.dumps(data), object_hook=renamed)
 
 
 def _in_units(name: str, read: Channel) -> str:
@@ -152,8 +151,8 @@ def table_of(outcome: Outcome) -> tuple[list[str], list[list[Any]]]:
             "fixed": "; ".join(each.get("fixed", ())),
             REASONS: " ".join(each["reasons"]),
             METHODS: " ".join(set_up_in_words(each)),
+            LINEAR: "yes" if each["without_model"]["is_linear"] else "no",
         }
-        row[LINEAR] = "yes" if each["without_model"]["is_linear"] else "no"
         without = each["without_model"]["quantities"]
         if not each["assumed"]["identifiability"]["at_s"]:
             without = [own for own in without if own["kind"] in (LEVEL, EXPONENT)]

@@ -14,7 +14,6 @@ import os
 import re
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
@@ -262,13 +261,13 @@ def _with_instrument(
     block = checked(MeasurementBlock, measurement)[0]
     controlled = (instrument if block is None else block.instrument).controlled
     found = {**merged, "instrument": kind, "measurement": measurement}
-    of_column = measurement.get(LOAD[-1]) is not None
+    phase = {"duration_s": 1.0, controlled.column: 1.0}
+    held = {**found, "protocol": {"phases": [phase]}}
     if instrument.sweeps:
         if level is not None:
             raise BiogripError(f"{by}: is of a trace in time, not of a sweep; leave it out.")
-        held = {"phases": [{"duration_s": 1.0, controlled.column: 1.0}]}
-        return {**found, "protocol": held}, None, None
-    if level is None and not of_column:
+        return held, None, None
+    if level is None and measurement.get(LOAD[-1]) is None:
         if "protocol" in given or instrument.has_jaws:
             return found, None, None
         if not instrument.relative:
@@ -279,16 +278,16 @@ def _with_instrument(
             )
     if block is None:
         # The study will say why.
-        level = None
-    elif level is not None:
-        level = controlled.in_si(*held_unit(level, controlled, by))
-    own = None
-    # Whoever uses the trace says what is wrong.
-    with suppress(BiogripError):
-        own = asked.read(block) if block else None
-    phase = {"duration_s": 1.0, controlled.column: 1.0 if level is None else level}
+        return held, None, None
+    if level is not None:
+        phase[controlled.column] = controlled.in_si(*held_unit(level, controlled, by))
+    try:
+        own = asked.read(block)
+    except BiogripError:
+        # Whoever uses the trace says what is wrong.
+        return held, None, None
     record, start_s = None, measurement.get("start_s")
-    if own is not None and own.load is not None:
+    if own.load is not None:
         first_s, first = own.load[0].tolist()
         # A load that is there in the first row came before it: at 0, as one that is held.
         if start_s is None:
@@ -298,8 +297,8 @@ def _with_instrument(
         largest = max(record[:, 1], key=abs)
         if instrument.relative:
             record[:, 1] /= largest
-        phase = {"duration_s": float(record[-1, 0]), controlled.column: float(largest)}
-    elif own is not None:
+        phase |= {"duration_s": float(record[-1, 0]), controlled.column: float(largest)}
+    else:
         first = start_s or min(float(own.time_s[0]), 0.0)
         lasts = float(own.time_s[-1]) - first
         phase["duration_s"] = lasts if lasts > 0 else 1.0
@@ -309,7 +308,7 @@ def _with_instrument(
                 f"to the last reading; allowed are {SHORTEST_S:g} to {LONGEST_S:g} s. Is the unit "
                 "of time right? Or say when it started (--start)."
             )
-    return {**found, "protocol": {"phases": [phase]}}, own, record
+    return held, own, record
 
 
 def _from(load: Array, start_s: float) -> Array:

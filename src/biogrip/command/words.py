@@ -334,9 +334,8 @@ def set_up_in_words(found: Mapping[str, Any]) -> list[str]:
         text = f"Its arms of {own['arm_length_m']:g} m have a stiffness of {' and '.join(arms)}"
         said.append(f"{text} N m/rad, and stand at {own['reference_angle_deg']:g} degrees.")
     fixed = f" with {', '.join(found['fixed'])}" if "fixed" in found else ""
-    along = [name for name in ("offset", "drift") if f"{name}_rad" in found]
-    along += ["drift"] if "drift_rad_per_s" in found else []
-    along += ["start"] if "onset_s" in found else []
+    terms = {"offset_rad": "offset", "drift_rad_per_s": "drift", "onset_s": "start"}
+    along = [name for key, name in terms.items() if key in found]
     also = f", along with the instrument's {' and '.join(along)}" if along else ""
     title = found["model_title"].removesuffix(" model")
     said.append(f"The model ({title}{fixed}) was fitted by least squares{also}; {_noise(found)}.")
