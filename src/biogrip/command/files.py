@@ -196,16 +196,28 @@ def side_by_side(work: Callable[[J], T], jobs: Sequence[J], most: int) -> Iterat
     there at once; they are forked, and end when this one does, however that ends. An error that
     work raises is raised here.
     """
-    fork = get_context("fork")
+    fork, parent = get_context("fork"), os.getpid()
     running: dict[Any, tuple[int, Any]] = {}
     done: dict[int, T | None] = {}
     started = given = 0
+
+    def send(ours: Connection, theirs: Connection, job: J) -> None:
+        """Send what work gives, and the error that it raises, of which one is None."""
+        end_with(parent)
+        # If the parent ends before, nobody reads what is sent.
+        ours.close()
+        try:
+            found: tuple[T | None, Exception | None] = work(job), None
+        except Exception as error:
+            found = None, error
+        with suppress(OSError):
+            theirs.send(found)
+
     try:
         while given < len(jobs):
             while started < len(jobs) and len(running) < most:
                 ours, theirs = fork.Pipe(duplex=False)
-                job = ours, theirs, os.getpid(), work, jobs[started]
-                process = fork.Process(target=_send, args=job)
+                process = fork.Process(target=send, args=(ours, theirs, jobs[started]))
                 process.start()
                 # What nobody can write to any more has an end.
                 theirs.close()
@@ -228,21 +240,6 @@ def side_by_side(work: Callable[[J], T], jobs: Sequence[J], most: int) -> Iterat
         for ours, (_, process) in running.items():
             ours.close()
             process.join()
-
-
-def _send(
-    ours: Connection, theirs: Connection, parent: int, work: Callable[[J], T], job: J
-) -> None:
-    """Send what work gives, and the error that it raises, of which one is None."""
-    end_with(parent)
-    # If the parent ends before, nobody reads what is sent.
-    ours.close()
-    try:
-        found: tuple[T | None, Exception | None] = work(job), None
-    except Exception as error:
-        found = None, error
-    with suppress(OSError):
-        theirs.send(found)
 
 
 def _made_from(asked: Asked) -> str:

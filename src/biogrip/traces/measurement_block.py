@@ -226,11 +226,6 @@ class MeasurementBlock(Block):
         """Name of that of what the instrument reads."""
         return self.named[self.readings[0]]
 
-    @property
-    def factor(self) -> float:
-        """Scale of the numbers in the column of the readings."""
-        return 1.0 if self.scale is None else self.scale
-
     def said_by(self, *keys: str) -> str:
         """Return the options or config keys that say something, for messages."""
         if self.by_options:

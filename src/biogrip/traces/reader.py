@@ -275,7 +275,8 @@ def _checked(
         used &= clock <= columns.until_s
     values, lines, time_s = values[used], lines[used], time_s[used]
     _check_count(path, columns, len(values), without_number, f"usable {columns.axis}")
-    quantity, end = columns.instrument.read, "rad_per_s" if columns.partner else "s"
+    quantity, scale = columns.instrument.read, columns.scale or 1.0
+    end = "rad_per_s" if columns.partner else "s"
     form = {
         "gaps": without_number,
         "averaged": averaged or None,
@@ -284,8 +285,8 @@ def _checked(
         f"first_{end}": float(time_s[0]),
         f"last_{end}": float(time_s[-1]),
     }
-    readings, sd = quantity.in_si(values[:, 1], units[1], columns.factor), None
-    unit = quantity.units[units[1]] * columns.factor
+    readings, sd = quantity.in_si(values[:, 1], units[1], scale), None
+    unit = quantity.units[units[1]] * scale
     if columns.sd is not None:
         sd = values[:, 2] * abs(unit) * quantity.slope(values[:, 1] * unit)
     if columns.partner:
@@ -321,16 +322,16 @@ def _both_moduli(
     path: Path | None, columns: MeasurementBlock, units: list[str], values: Array, lines: IntArray
 ) -> tuple[Array, Array]:
     """Return storage and loss moduli of a sweep, (n_rows,) in SI units."""
-    partner, read = columns.partner, columns.instrument.read
+    partner, read, scale = columns.partner, columns.instrument.read, columns.scale or 1.0
     assert partner is not None
     for row in np.flatnonzero(values[:, 0] <= 0)[:1]:
         found = f"found a frequency of {values[row, 0]:.3g}; allowed is one above 0"
         raise BiogripError(f"{place(path, lines[row])}: {found}.")
-    first = values[:, 1] * (read.units[units[1]] * columns.factor)
+    first = values[:, 1] * (read.units[units[1]] * scale)
     second = values[:, 2] * partner.units[units[2]]
     is_whole = read.name == "complex_modulus"
     if partner.unit == read.unit:
-        loss = second * columns.factor
+        loss = second * scale
         square = first**2 - loss**2
         storage = np.sign(square) * np.sqrt(np.abs(square)) if is_whole else first
     else:
