@@ -1,11 +1,6 @@
-"""What tests say of the columns of a trace."""
-
 from typing import Any
 
-from biogrip.physics.noise import Noise
-from biogrip.traces.measurement_block import ByOptions, MeasurementBlock
-
-NONE = Noise("gaussian", 0.0, "peak")
+from biogrip.traces.measurement_block import UNREAD, ByOptions, MeasurementBlock
 
 
 def columns_of(
@@ -16,8 +11,6 @@ def columns_of(
     by_options: bool = False,
     **keys: Any,
 ) -> MeasurementBlock:
-    """The measurement of a file, with the column of a quantity, and other keys."""
-    if quantity == "rotation" and "reading_unit" in keys:
-        keys["rotation_unit"] = keys.pop("reading_unit")
-    keys |= {"rate_Hz": 1.0, "noise": NONE, "time": time, quantity: reading}
-    return (ByOptions if by_options else MeasurementBlock)(**keys)
+    """The measurement of a file, not checked, with the column of a quantity, and other keys."""
+    made = ByOptions if by_options else MeasurementBlock
+    return made(**{**vars(UNREAD), "time": time, quantity: reading, **keys})
