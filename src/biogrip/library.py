@@ -46,7 +46,6 @@ one_blas_thread: Callable[[_Function], _Function] = threadpool_limits.wrap(
 )
 """Decorator of what fits: its matrices are small, and BLAS threads cost more than they bring."""
 
-_TRACE = "trace"
 # Options of the command in what it says, and the arguments and keys that they are here.
 _ARGUMENTS = (
     ("--reading loss=COLUMN", "loss=..."),
@@ -231,13 +230,13 @@ def identify_trace(
         ("fixed", "fixed", fixed and {**fixed}),
     ]
     settings = [Setting(by, tuple(key.split(".")), it) for by, key, it in chosen if it is not None]
-    asked = Asked(Path(_TRACE), None, tuple(settings), "arguments", arrays=(*columns.values(),))
+    asked = Asked(Path("trace"), None, tuple(settings), "arguments", arrays=(*columns.values(),))
     try:
         recording, case = read_trace(asked)
         diagnosis = identify(recording, case.judged_experiment)
     except BiogripError as error:
         raise BiogripError(_with_arguments(str(error))) from None
-    data = data_of(diagnosis, case, _TRACE, asked.given)
+    data = data_of(diagnosis, case, asked.name, asked.given)
     return TraceResult(diagnosis, _with_arguments(data), arguments)
 
 

@@ -102,8 +102,7 @@ def identify_files(
         raise BiogripError("--output: only for one trace; each of several gets its own file.")
     # Errors of options and config concern all traces: they are raised once, here.
     check_settings(every)
-    outputs = [output or own.output for own in every]
-    outputs = outputs if rows is None else []
+    outputs = [output or own.output for own in every] if rows is None else []
     written = [*outputs, *filter(None, (report, table))]
     check_outputs(written, [*files, *(own.trace for own in every), *filter(None, [config])])
     drawn = report is not None and len(every) <= MOST_DRAWN

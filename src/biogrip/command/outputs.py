@@ -99,10 +99,7 @@ _OF_READINGS = ("misfit_rad", "noise_rad", "scatter_rad", "offset_rad", "drift_r
 def as_written(data: Mapping[str, Any]) -> dict[str, Any]:
     """Return the result of a trace, `data_of`, as it comes back from its JSON file."""
     # Assumptions, which must be repeatable, are not rounded.
-    found: dict[str, Any] = json.loads(
-        json.dumps(rounded_numbers(data) | {"assumed": data["assumed"]})
-    )
-    return found
+    return json.loads(json.dumps(rounded_numbers(data) | {"assumed": data["assumed"]}))
 
 
 def write_result(path: Path, data: Mapping[str, Any], made_from: str) -> None:

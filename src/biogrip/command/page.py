@@ -209,5 +209,4 @@ def beyond(one: Mapping[str, Any], shared: Mapping[str, Any]) -> dict[str, Any]:
 
 def _as_yaml(block: Mapping[str, Any]) -> str:
     dumper: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
-    text: str = yaml.dump(block, Dumper=dumper, sort_keys=False, allow_unicode=True)
-    return text
+    return yaml.dump(block, Dumper=dumper, sort_keys=False, allow_unicode=True)

@@ -170,8 +170,7 @@ def _laid_over(blocks: dict[str, Any], setting: Setting) -> dict[str, Any]:
         path, value = ("sample",), {"model": sample.name, "branches": sample.branches}
     for part in reversed(path):
         value = {part: value}
-    found: dict[str, Any] = overlaid(blocks, value)
-    return found
+    return overlaid(blocks, value)
 
 
 def read_trace(asked: Asked) -> tuple[Recording, Case]:
