@@ -7,7 +7,7 @@ with the sample is the same for both.
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 from pydantic import BeforeValidator, Field, Tag
 
@@ -185,7 +185,8 @@ class MeasurementBlock(Block):
     or not, then fits an offset and a drift along, unless they are false. By default white."""
     noise: Noise
 
-    by_options: ClassVar[bool] = False
+    # No key.
+    by_options = False
     """False if keys of the config say all; used in messages."""
 
     @property
