@@ -481,14 +481,14 @@ def read_table(
 
 def _parts(traces: Sequence[Path], set_by: Sequence[Mapping[str, str]]) -> list[str]:
     """Return what tells each trace from others of its file: cells of its row that differ there."""
-    differ = defaultdict[str, dict[str, set[str]]](lambda: defaultdict(set))
+    differ = defaultdict[tuple[str, str], set[str]](set)
     # Resolved, so that links to one file are found.
     files = [os.path.realpath(trace) for trace in traces]
     for file, cells in zip(files, set_by, strict=True):
         for name, cell in cells.items():
-            differ[file][name].add(cell)
+            differ[file, name].add(cell)
     return [
-        " ".join(cell for name, cell in cells.items() if cell and len(differ[file][name]) > 1)
+        " ".join(cell for name, cell in cells.items() if cell and len(differ[file, name]) > 1)
         for file, cells in zip(files, set_by, strict=True)
     ]
 
