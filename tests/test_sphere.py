@@ -7,8 +7,8 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.physics.instruments import INSTRUMENTS, under_sphere
-from biogrip.traces.columns import Columns
 from biogrip.traces.reader import recording_of_arrays
+from tests.helpers.columns import columns_of
 from tests.helpers.identified import by_quantity, identified, identify, write_trace
 
 RADIUS_M = 2.5e-6
@@ -81,7 +81,7 @@ def test_a_number_counts_by_its_power_and_back() -> None:
     # 1.5 sqrt(d/R) for each radius.
     assert depth.slope(4.0) == 3.0
     # A column of half micrometres: 16 of them are 4 radii of 2 um, and one is 0.25.
-    columns = Columns("time_s", "d", sd="sd", reading_unit="um", scale=0.5, quantity=depth)
+    columns = columns_of("time_s", "d_um", "strain", sd="sd", scale=0.5, sphere="2 um")
     number, sd = np.full(9, 16.0), np.full(9, 0.1)
     found = recording_of_arrays(columns, np.arange(9.0), number, sd)
     assert found.readings == pytest.approx(8.0)

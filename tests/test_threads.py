@@ -46,14 +46,13 @@ def test_a_notebook_that_has_threads_keeps_them_and_fits_with_one(
 ) -> None:
     time_s, held = np.arange(1, 30.0), (library.hold(30.0, 1.0),)
     creep = library.set_up(library.INSTRUMENTS["strain"], held, library.Sample("liquid_drop"))
-    for name in ("read_trace", "identify_many", "diagnose"):
+    for name in ("read_trace", "identify_many"):
         monkeypatch.setattr(library, name, tell)
     trace: tuple[Any, Any] = time_s, 2 - np.exp(-time_s)
     with threadpool_limits(2, "blas"):
         for use in (
             lambda: library.identify_trace(*trace, reads="strain", hold=1.0),
             lambda: library.identify_sample(creep, *trace),
-            lambda: library.judge(creep, *trace, None),  # type: ignore[arg-type]
         ):
             with pytest.raises(library.BiogripError, match=r"threads: .1.$"):
                 use()

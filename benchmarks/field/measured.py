@@ -25,8 +25,9 @@ from biogrip.arrays import Array, BoolArray
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.problem import Fit
 from biogrip.identify.prepare import prepare, ranges_of
+from biogrip.judging.diagnosis import diagnose
 from biogrip.judging.verdicts import DETERMINED
-from biogrip.library import Phase, Sample, hold, identify_sample, judge, simulate
+from biogrip.library import Phase, Sample, hold, identify_sample, one_blas_thread, simulate
 from biogrip.study.study import load_study, read_configs
 from biogrip.traces.reader import Recording, read_recording
 
@@ -50,7 +51,7 @@ def _recorded(name: str) -> tuple[Recording, Experiment]:
     files = [ROOT / file for file in CONFIGS]
     case = load_study(read_configs(files), files).cases[name]
     file = ROOT / f"data/measured/{name}.csv"
-    return prepare(read_recording(file, case.columns), case.experiment)
+    return prepare(read_recording(file, case.block.measurement), case.experiment)
 
 
 @dataclass(frozen=True)
@@ -169,15 +170,17 @@ def natural(task: Task) -> str:
 
 
 def by_biogrip(task: Task, measure: str | None = None) -> Answer:
-    """Identify a sample as `identify_sample` and `judge` do."""
+    """Identify a sample as `identify_sample` does, and judge the fit alone."""
     experiment = task.experiment(measure or natural(task))
     found = identify_sample(experiment, task.time_s, task.data)
     value = dict(zip(experiment.searched.names, map(float, found.parameters), strict=True))
     return Answer(task.curve(value), value, partial(_judged, task, experiment, found))
 
 
+@one_blas_thread
 def _judged(task: Task, experiment: Experiment, found: Fit) -> Said:
-    diagnosis = judge(experiment, task.time_s, task.data, found)
+    problem = experiment.of(task.time_s, task.data)
+    diagnosis = diagnose(problem, found, confidence=0.95)
     return {
         f.quantity.label: (f.value if f.verdict == DETERMINED else None, f.low, f.high)
         for f in diagnosis.findings

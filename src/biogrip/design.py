@@ -18,7 +18,7 @@ import yaml
 from biogrip import __version__
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.command.outputs import WRITTEN_BY, check_outputs
-from biogrip.digits import with_unit
+from biogrip.digits import significant, with_unit
 from biogrip.errors import BiogripError, nearest
 from biogrip.files import write_text
 from biogrip.physics.modes import linear_responses
@@ -84,8 +84,9 @@ class Train:
         """Phases of a protocol, one a step."""
         durations_s = np.diff(self.starts, append=2 * self.limits.intervals)
         durations_s = durations_s / (2 * self.limits.rate_Hz)
-        pairs = zip(durations_s.tolist(), self.levels.tolist(), strict=True)
-        return tuple(hold(_rounded(lasts_s), _rounded(level)) for lasts_s, level in pairs)
+        # Without the last digits, in which rounding shows.
+        rounded = (significant(values, 12).tolist() for values in (durations_s, self.levels))
+        return tuple(hold(*pair) for pair in zip(*rounded, strict=True))
 
 
 @dataclass(frozen=True, eq=False)
@@ -459,8 +460,3 @@ def _said(
         "A bound is the least standard deviation (Cramér-Rao) in percent of the value, with all "
         "parameters unknown that are not fixed. The noise is white, and the same under both."
     )
-
-
-def _rounded(value: float) -> float:
-    """Return a number without the last digits, in which rounding shows."""
-    return float(f"{value:.12g}")

@@ -133,9 +133,7 @@ def adapter(kind: Any) -> TypeAdapter[Any]:
 def built(kind: Callable[..., T], block: Any, *, check: bool = False) -> T:
     """Return the object that a plain block describes; if asked, find conflicts of keys, too."""
     # As JSON, for then pydantic takes blocks for dataclasses and lists for tuples.
-    found: T
-    (found,) = adapter(kind).validate_json(json.dumps([block], default=str), context=check)
-    return found
+    return adapter(kind).validate_json(json.dumps([block], default=str), context=check)[0]
 
 
 def plain(value: object) -> Any:

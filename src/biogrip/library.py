@@ -1,4 +1,4 @@
-"""Functions for notebooks: identify a trace; simulate, add noise, identify, judge, plot.
+"""Functions for notebooks: identify a trace; simulate, add noise, fit.
 
 The commands and the workflow use the same functions. Columns of pandas do as arrays.
 """
@@ -25,7 +25,7 @@ from biogrip.fit.genome import GeneRange
 from biogrip.fit.least_squares import identify_many
 from biogrip.fit.problem import Fit, silent
 from biogrip.identify.identify import identify
-from biogrip.judging.diagnosis import Diagnosis, diagnose, with_times
+from biogrip.judging.diagnosis import Diagnosis
 from biogrip.physics.gripper import NO_ARMS, Arm, Gripper
 from biogrip.physics.instruments import GRIPPER, INSTRUMENTS, Instrument
 from biogrip.physics.models import Sample
@@ -46,7 +46,6 @@ one_blas_thread: Callable[[_Function], _Function] = threadpool_limits.wrap(
 )
 """Decorator of what fits: its matrices are small, and BLAS threads cost more than they bring."""
 
-_TRACE = "trace"
 # Options of the command in what it says, and the arguments and keys that they are here.
 _ARGUMENTS = (
     ("--reading loss=COLUMN", "loss=..."),
@@ -231,13 +230,13 @@ def identify_trace(
         ("fixed", "fixed", fixed and {**fixed}),
     ]
     settings = [Setting(by, tuple(key.split(".")), it) for by, key, it in chosen if it is not None]
-    asked = Asked(Path(_TRACE), None, tuple(settings), "arguments", arrays=(*columns.values(),))
+    asked = Asked(Path("trace"), None, tuple(settings), "arguments", arrays=(*columns.values(),))
     try:
         recording, case = read_trace(asked)
         diagnosis = identify(recording, case.judged_experiment)
     except BiogripError as error:
         raise BiogripError(_with_arguments(str(error))) from None
-    data = data_of(diagnosis, case, _TRACE, asked.given)
+    data = data_of(diagnosis, case, asked.name, asked.given)
     return TraceResult(diagnosis, _with_arguments(data), arguments)
 
 
@@ -300,8 +299,6 @@ def simulate(
     experiment: Experiment,
     parameters: Mapping[str, float],
     time_s: ArrayLike,
-    *,
-    nonlinear: bool = False,
 ) -> Array:
     """Simulate what the instrument reads without noise: of a gripper, the left arm's rotation.
 
@@ -313,8 +310,6 @@ def simulate(
         Parameters of the sample by name, SI units.
     time_s : (n_samples,)
         Sampling times, ascending.
-    nonlinear
-        If true, use the nonlinear equations; fits use the linear ones.
 
     Returns
     -------
@@ -323,14 +318,14 @@ def simulate(
     """
     network, torque = experiment.model.sample(parameters), experiment.torque
     times = as_column(time_s, "time_s")
-    return simulated_response(experiment.gripper, network, torque, times, nonlinear=nonlinear)[0]
+    return simulated_response(experiment.gripper, network, torque, times, nonlinear=False)[0]
 
 
 @one_blas_thread
 def identify_sample(
     experiment: Experiment, time_s: ArrayLike, readings: ArrayLike, seed: int = 0
 ) -> Fit:
-    """Identify the sample by least squares from many starts.
+    """Identify the sample by least squares from many starts: a fit alone, nothing is judged.
 
     Parameters
     ----------
@@ -344,43 +339,6 @@ def identify_sample(
     problem = experiment.of(as_column(time_s, "time_s"), as_column(readings, "readings"))
     rngs = [np.random.default_rng(seed)]
     return identify_many([problem], experiment.least_squares, rngs, silent)[0]
-
-
-@one_blas_thread
-def judge(
-    experiment: Experiment,
-    time_s: ArrayLike,
-    readings: ArrayLike,
-    found: Fit,
-    confidence: float = 0.95,
-) -> Diagnosis:
-    """Compute confidence limits and verdicts from profile likelihoods.
-
-    Parameters
-    ----------
-    experiment
-        Experiment from `set_up`.
-    time_s, readings : (n_samples,)
-        Trace in SI units.
-    found
-        Result of `identify_sample`.
-    confidence
-        Confidence level of the limits.
-    """
-    problem = experiment.of(as_column(time_s, "time_s"), as_column(readings, "readings"))
-    return with_times([diagnose(problem, found, confidence=confidence)])[0]
-
-
-def plot(experiment: Experiment, time_s: ArrayLike, readings: ArrayLike, found: Fit) -> "Figure":
-    """Draw a trace, its fit and the residuals."""
-    from biogrip.figures.fit import draw_fit, fit_of
-    from biogrip.figures.style import styled
-
-    values = dict(zip(experiment.searched.names, map(float, found.parameters), strict=True))
-    trace = as_column(time_s, "time_s"), as_column(readings, "readings")
-    fit = fit_of(experiment, values, *trace)
-    with styled():
-        return draw_fit({"best fit": fit}, "")
 
 
 __all__ = [
@@ -400,8 +358,6 @@ __all__ = [
     "hold",
     "identify_sample",
     "identify_trace",
-    "judge",
-    "plot",
     "set_up",
     "simulate",
     "to_table",

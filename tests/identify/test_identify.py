@@ -15,8 +15,8 @@ from biogrip.library import INSTRUMENTS, BiogripError, Sample, hold, set_up
 from biogrip.stages.judgement import judge
 from biogrip.stages.targets import record
 from biogrip.study.source import overlaid
-from biogrip.traces.columns import Columns
 from biogrip.traces.reader import recording_of_arrays
+from tests.helpers.columns import columns_of
 from tests.helpers.default import study_of
 from tests.helpers.identified import identified, write_trace
 
@@ -88,10 +88,11 @@ def test_a_message_names_array_and_index() -> None:
         ({"rows": {"step": 1}}, "measurement.rows: is only for a file, not for arrays."),
     ):
         creep = set_up(INSTRUMENTS["strain"], (hold(600.0, 100.0),), Sample("zener_kelvin"))
-        own: dict[str, Any] = {"time_s": SECONDS, "strain": STRAIN, "rows": None, **given}
-        columns = Columns("time_s", "strain", quantity=creep.instrument.read, rows=own["rows"])
+        own: dict[str, Any] = {"time_s": SECONDS, "strain": STRAIN, **given}
+        time_s, strain = own.pop("time_s"), own.pop("strain")
+        columns = columns_of("time_s", "strain", "strain", **own)
         with pytest.raises(BiogripError, match=said):
-            identify(recording_of_arrays(columns, own["time_s"], own["strain"]), creep)
+            identify(recording_of_arrays(columns, time_s, strain), creep)
 
 
 def test_neither_study_nor_figures_are_loaded_for_a_trace() -> None:

@@ -9,6 +9,7 @@ import pytest
 
 from biogrip import library
 from biogrip.arrays import Array
+from biogrip.judging.diagnosis import diagnose
 from biogrip.judging.doubts import DOUBT, Note
 from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.models import MODELS, generalized_maxwell
@@ -97,7 +98,8 @@ def notes_of(model: str, time_s: Array, truth: dict[str, float]) -> list[Note]:
     clean = library.simulate(experiment, truth, time_s)
     trace = clean + 0.02 * clean.max() * np.random.default_rng(4).standard_normal(len(time_s))
     found = library.identify_sample(experiment, time_s, trace)
-    notes = library.judge(experiment, time_s, trace, found).notes
+    problem = experiment.of(time_s, trace)
+    notes = diagnose(problem, found, confidence=0.95).notes
     return [note for note in notes if note.text.startswith("The arms ring")]
 
 

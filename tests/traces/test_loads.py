@@ -16,11 +16,13 @@ from biogrip.identify.data import trace_data
 from biogrip.identify.identify import identify
 from biogrip.identify.load_noise import smoothed
 from biogrip.identify.prepare import _noise, prepare
-from biogrip.physics.instruments import CONTROLLED, INSTRUMENTS
+from biogrip.judging.diagnosis import Diagnosis
+from biogrip.physics.instruments import CONTROLLED
 from biogrip.physics.protocol import evaluate
 from biogrip.study.source import HOLD
-from biogrip.traces.columns import Columns, held_unit
+from biogrip.traces.columns import held_unit
 from biogrip.traces.reader import read_recording
+from tests.helpers.columns import columns_of
 from tests.helpers.default import seen
 from tests.helpers.identified import write_trace
 
@@ -59,7 +61,7 @@ def test_readings_beside_the_record_of_the_load_are_gaps(tmp_path: Path) -> None
     there = {*range(3, 10), *range(12, 17)}
     rows = [f"{i},{5 if i in there else ''},{i}" for i in range(20)]
     (path := tmp_path / "t.csv").write_text("\n".join(["time_s,stress_Pa,strain", *rows]))
-    columns = Columns("time_s", "strain", quantity=INSTRUMENTS["strain"].read, load="stress_Pa")
+    columns = columns_of("time_s", "strain", "strain", load="stress_Pa")
     recorded = read_recording(path, columns)
     assert (recorded.time_s.tolist(), recorded.gaps) == ([*range(3, 17)], 6)
 
@@ -104,6 +106,13 @@ def test_scatter_that_readings_do_not_follow_is_smoothed_out(
     assert said.endswith("from 0 s (column stress_Pa, 400 rows).")
 
 
+def judged(path: Path, *columns: Array) -> Diagnosis:
+    """What such a file tells of a Zener solid, beside no other models."""
+    model = Setting("--model", ("sample", "model"), "zener_kelvin")
+    recording, case = read_trace(loaded(path, *columns, more=[model]))
+    return identify(recording, replace(case.judged_experiment, models=(), usual_models=False))
+
+
 @pytest.mark.parametrize("at_s", [(9.05,), (9.0, 60.0)])
 def test_limits_allow_for_steps_anywhere_between_two_rows(
     tmp_path: Path, at_s: tuple[float, ...]
@@ -117,10 +126,7 @@ def test_limits_allow_for_steps_anywhere_between_two_rows(
         crept = 1 / 500 + (1 - np.exp(-since / 10)) / 300
         strain += np.where(log_s >= step_s, sign * 5 * crept, 0.0)
         stress += np.where(log_s >= step_s, sign * 5.0, 0.0)
-    model = Setting("--model", ("sample", "model"), "zener_kelvin")
-    recording, case = read_trace(loaded(tmp_path / "log.csv", log_s, strain, stress, more=[model]))
-    alone = replace(case.judged_experiment, models=(), usual_models=False)
-    diagnosis = identify(recording, alone)
+    diagnosis = judged(tmp_path / "log.csv", log_s, strain, stress)
     assert diagnosis.status == "ok"
     width = []
     for finding, truth in zip(diagnosis.findings, (500.0, 300.0, 3000.0, 10.0), strict=True):
@@ -142,10 +148,7 @@ def test_the_clock_of_a_smooth_load_is_doubted(tmp_path: Path, late_rows: float)
     strain = 5 * (np.sin(turn) / 500 + delayed / 300 / (1 + (np.pi * tau_s) ** 2))
     strain += np.random.default_rng(2).normal(0, 1e-4, len(clock))
     logged = 5 * np.sin(np.maximum(turn - np.pi * 0.05 * late_rows, 0.0))
-    model = Setting("--model", ("sample", "model"), "zener_kelvin")
-    recording, case = read_trace(loaded(tmp_path / "log.csv", clock, strain, logged, more=[model]))
-    alone = replace(case.judged_experiment, models=(), usual_models=False)
-    diagnosis = identify(recording, alone)
+    diagnosis = judged(tmp_path / "log.csv", clock, strain, logged)
     k_s = diagnosis.findings[0]
     assert ((k_s.low or 0.0) < 500 < (k_s.high or np.inf)) == (not late_rows)
     said = [note.text for note in diagnosis.notes if "seems to be logged" in note.text]
@@ -163,10 +166,7 @@ def test_a_load_that_tells_no_clock_is_left_alone(tmp_path: Path) -> None:
     clock, load = np.arange(0.0, 30.0, 0.1), 0.2 * np.arange(0.0, 30.0, 0.1)
     strain = load / 500 + (load - 0.1 * (1 - np.exp(-clock / 0.5))) / 300
     strain += 0.01 * strain.max() * np.random.default_rng(1).standard_normal(len(clock))
-    model = Setting("--model", ("sample", "model"), "zener_kelvin")
-    recording, case = read_trace(loaded(tmp_path / "log.csv", clock, strain, load, more=[model]))
-    alone = replace(case.judged_experiment, models=(), usual_models=False)
-    diagnosis = identify(recording, alone)
+    diagnosis = judged(tmp_path / "log.csv", clock, strain, load)
     assert diagnosis.status == "ok"
     assert not [note for note in diagnosis.notes if "seems to be logged" in note.text]
 
@@ -264,8 +264,8 @@ def test_a_column_of_the_load_is_the_protocol_of_all_rows(tmp_path: Path, start_
     np.testing.assert_allclose(evaluate(history, EVEN), 5e-6 * load_at(EVEN), atol=1e-15)
     assert len(history.steps_s) == 0
     assert len(history.time_s) < 300
-    assert case.columns.start_s == (start_s or None)
-    found = read_recording(asked.trace, case.columns)
+    assert case.block.measurement.start_s == (start_s or None)
+    found = read_recording(asked.trace, case.block.measurement)
     dwell = (EVEN >= 8) & (EVEN < 50)
     np.testing.assert_allclose(found.time_s, EVEN[dwell] + start_s)
     assert found.form["others"] == np.count_nonzero(~dwell)

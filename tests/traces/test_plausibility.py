@@ -16,13 +16,14 @@ from biogrip.physics.models import MODELS
 from biogrip.physics.noise import Noise, add_noise
 from biogrip.physics.protocol import Phase, hold, join_phases, ramp, sample_times
 from biogrip.physics.response import step_response, superpose
-from biogrip.traces.columns import Columns
+from biogrip.traces.measurement_block import MeasurementBlock
 from biogrip.traces.reader import Recording
+from tests.helpers.columns import columns_of
 from tests.helpers.default import STUDY
 from tests.helpers.problems import GRIPPER
 
 UNEQUAL = Gripper(1.5e-3, 75.0, Arm(1.0e-14, 3.3e-12, 4.4e-7), Arm(1.3e-14, 2.5e-12, 5.5e-7))
-SI = Columns("time_s", "rotation_rad")
+SI = columns_of()
 SAMPLES = {name: tuple(case.parameters.values()) for name, case in STUDY.cases.items()}
 TIMES = sample_times(400.0, 1.0)
 NO_RESPONSE = "found no response to the torque"
@@ -40,7 +41,7 @@ def trace(
 def said(
     time_s: Array,
     values: Array,
-    columns: Columns = SI,
+    columns: MeasurementBlock = SI,
     gripper: Gripper = GRIPPER,
     phases: tuple[Phase, ...] = STUDY.phases,
     *,
@@ -48,7 +49,8 @@ def said(
     offset: bool = False,
 ) -> str:
     """What is said of a trace on lines 2, 3, ...: why it is refused, a note on it, or nothing."""
-    units = columns.time.removeprefix("time_"), columns.reading.removeprefix("rotation_")
+    time, reading = columns.named.values()
+    units = time.removeprefix("time_"), reading.removeprefix("rotation_")
     lines, file = np.arange(len(time_s)) + 2, Path("trace.csv")
     recording = Recording(time_s, values, lines, file, columns, units)
     problem = replace(set_up(gripper, phases, Sample("maxwell")), offset=offset)
@@ -107,9 +109,9 @@ def test_the_unit_that_would_fit_is_named() -> None:
     ):
         values, of_time = trace(SAMPLES["liquid_drop_1"]), column.startswith("time")
         if of_time:
-            text = said(factor * TIMES, values, Columns(column, "rotation_rad"))
+            text = said(factor * TIMES, values, columns_of(column))
         else:
-            text = said(TIMES, factor * values, Columns("time_s", column))
+            text = said(TIMES, factor * values, columns_of(reading=column))
         assert text.startswith(f"trace.csv, {found}")
         assert f"column '{column}'" in text
         assert f"It would fit if it were {hint}" in text
@@ -188,7 +190,7 @@ def test_what_rounding_leaves_of_a_torque_is_no_response(samples: int) -> None:
 )
 def test_times_outside_the_protocol_are_refused(by_options: bool, how: str) -> None:
     values = trace(SAMPLES["liquid_drop_1"])
-    columns = Columns("time_s", "rotation_rad", by_options=by_options)
+    columns = columns_of(by_options=by_options)
     for shift_s, found in ((-1.0, "line 2, column 'time_s': found -1 s"), (1.5, "line 401, ")):
         text = said(TIMES + shift_s, values, columns)
         assert text.startswith(f"trace.csv, {found}")

@@ -26,7 +26,7 @@ from biogrip.fit.problem import METHODS
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.stages.job import CASE_KEYS, STUDY_KEYS, batch_names, keys_of_cases, settings
 from biogrip.study.study import load_given_study
-from biogrip.study.measurement_block import MeasurementBlock
+from biogrip.traces.measurement_block import MeasurementBlock
 from biogrip.study.source import default_config, shipped
 
 

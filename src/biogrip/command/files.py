@@ -9,9 +9,8 @@ import sys
 import traceback
 from collections import defaultdict
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import replace
-from functools import partial
 from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
@@ -39,6 +38,7 @@ from biogrip.command.settings import (
 from biogrip.command.words import in_columns, in_words
 from biogrip.errors import BiogripError
 from biogrip.files import digest_of, software
+from biogrip.fit.experiment import Experiment
 from biogrip.fit.genome import SearchRange
 from biogrip.identify.data import trace_data
 from biogrip.identify.identify import STEPS, budget, identify_alike
@@ -102,8 +102,7 @@ def identify_files(
         raise BiogripError("--output: only for one trace; each of several gets its own file.")
     # Errors of options and config concern all traces: they are raised once, here.
     check_settings(every)
-    outputs = [output or own.output for own in every]
-    outputs = outputs if rows is None else []
+    outputs = [output or own.output for own in every] if rows is None else []
     written = [*outputs, *filter(None, (report, table))]
     check_outputs(written, [*files, *(own.trace for own in every), *filter(None, [config])])
     drawn = report is not None and len(every) <= MOST_DRAWN
@@ -196,16 +195,28 @@ def side_by_side(work: Callable[[J], T], jobs: Sequence[J], most: int) -> Iterat
     there at once; they are forked, and end when this one does, however that ends. An error that
     work raises is raised here.
     """
-    fork = get_context("fork")
+    fork, parent = get_context("fork"), os.getpid()
     running: dict[Any, tuple[int, Any]] = {}
     done: dict[int, T | None] = {}
     started = given = 0
+
+    def send(ours: Connection, theirs: Connection, job: J) -> None:
+        """Send what work gives, and the error that it raises, of which one is None."""
+        end_with(parent)
+        # If the parent ends before, nobody reads what is sent.
+        ours.close()
+        try:
+            found: tuple[T | None, Exception | None] = work(job), None
+        except Exception as error:
+            found = None, error
+        with suppress(OSError):
+            theirs.send(found)
+
     try:
         while given < len(jobs):
             while started < len(jobs) and len(running) < most:
                 ours, theirs = fork.Pipe(duplex=False)
-                job = ours, theirs, os.getpid(), work, jobs[started]
-                process = fork.Process(target=_send, args=job)
+                process = fork.Process(target=send, args=(ours, theirs, jobs[started]))
                 process.start()
                 # What nobody can write to any more has an end.
                 theirs.close()
@@ -230,21 +241,6 @@ def side_by_side(work: Callable[[J], T], jobs: Sequence[J], most: int) -> Iterat
             process.join()
 
 
-def _send(
-    ours: Connection, theirs: Connection, parent: int, work: Callable[[J], T], job: J
-) -> None:
-    """Send what work gives, and the error that it raises, of which one is None."""
-    end_with(parent)
-    # If the parent ends before, nobody reads what is sent.
-    ours.close()
-    try:
-        found: tuple[T | None, Exception | None] = work(job), None
-    except Exception as error:
-        found = None, error
-    with suppress(OSError):
-        theirs.send(found)
-
-
 def _made_from(asked: Asked) -> str:
     """Return in one line what the result of a trace follows from."""
     trace, default = digest_of(asked.trace), digest_of(default_config())
@@ -258,16 +254,19 @@ def identify_batch(
     alone = len(asked) == 1 and outputs is not None
     # Before anything is read: what is changed meanwhile is identified again.
     made_from = [] if outputs is None else [*map(_made_from, asked)]
-    name, count = asked[0].name if alone else "", 1 + STEPS
-    with Progress(name, count, live=alone, quiet=not alone) as progress:
-        read = [_tried(own, _read, own, progress) for own in asked]
-        judged = _judge_batch(asked, read, progress)
+    read: dict[int, tuple[Case, Trace]] = {}
+    refused: dict[str, str] = {}
     outcome = Outcome([], {})
-    for index, (own, found) in enumerate(zip(asked, judged, strict=True)):
-        if isinstance(found, BiogripError):
-            outcome.refused[own.name] = str(found)
-            continue
-        diagnosis, case = found
+    with Progress(asked[0].name if alone else "", 1 + STEPS, live=alone, quiet=not alone) as told:
+        for index, own in enumerate(asked):
+            with _caught(own, refused):
+                recording, case = read_trace(own)
+                if not is_usual(recording):
+                    told.note(form_in_words(own.trace, recording.form))
+                read[index] = case, prepare(recording, case.judged_experiment)
+        judged = _judge_batch(asked, read, refused, told)
+    for index, diagnosis in sorted(judged.items()):
+        own, (case, _) = asked[index], read[index]
         data = data_of(diagnosis, case, own.name, own.given)
         outcome.found.append(data)
         if outputs is not None:
@@ -276,31 +275,22 @@ def identify_batch(
             # Imported here: loading Matplotlib takes long.
             from biogrip.command.page import draw
 
-            pictures = _tried(own, draw, diagnosis, data)
-            if not isinstance(pictures, BiogripError):
-                outcome.pictures[own.name] = pictures
+            # What is found counts without a picture, too.
+            with _caught(own, {}):
+                outcome.pictures[own.name] = draw(diagnosis, data)
+    outcome.refused.update((own.name, refused[own.name]) for own in asked if own.name in refused)
     return outcome
-
-
-def _read(own: Asked, progress: Progress) -> tuple[Case, Trace]:
-    """Return the case that a trace is, and the trace, prepared."""
-    recording, case = read_trace(own)
-    if not is_usual(recording):
-        progress.note(form_in_words(own.trace, recording.form))
-    return case, prepare(recording, case.judged_experiment)
 
 
 def _judge_batch(
     asked: Sequence[Asked],
-    read: Sequence[tuple[Case, Trace] | BiogripError],
+    read: Mapping[int, tuple[Case, Trace]],
+    refused: dict[str, str],
     progress: Progress,
-) -> list[tuple[Diagnosis, Case] | BiogripError]:
-    """Return diagnoses, or errors of the traces that cannot be read or fitted."""
-    usable = {i: it for i, it in enumerate(read) if not isinstance(it, BiogripError)}
-    judged: dict[int, tuple[Diagnosis, Case] | BiogripError]
-    judged = {i: it for i, it in enumerate(read) if isinstance(it, BiogripError)}
+) -> dict[int, Diagnosis]:
+    """Return diagnoses of traces by their places, and add messages on those that fail."""
     alike = defaultdict[Hashable, list[int]](list)
-    for index, (_, (recording, experiment)) in usable.items():
+    for index, (_, (recording, experiment)) in read.items():
         few = len(recording.time_s) * _MOST_IN_BATCH <= _MOST_READINGS
         alike[budget(experiment), None if few else index].append(index)
 
@@ -308,35 +298,33 @@ def _judge_batch(
         progress.done()
         progress.doing(step)
 
-    groups = [*alike.values()]
-    # An error is of one of a group: it is then identified one by one.
+    groups, judged = [*alike.values()], dict[int, Diagnosis]()
     for group in groups:
-        found = _tried(
-            asked[group[0]],
-            partial(identify_alike, progress=progress.within, doing=doing),
-            [usable[index][1] for index in group],
-        )
-        if not isinstance(found, BiogripError):
-            judged |= {i: (it, usable[i][0]) for i, it in zip(group, found, strict=True)}
-        elif len(group) == 1:
-            judged[group[0]] = found
-        else:
+        traces, failed = [read[index][1] for index in group], dict[str, str]()
+        with _caught(asked[group[0]], failed):
+            found = identify_alike(traces, progress=progress.within, doing=doing)
+            judged |= zip(group, found, strict=True)
+        # An error is of one of a group: it is then identified one by one.
+        if failed and len(group) > 1:
             groups += ([index] for index in group)
-    return [judged[index] for index in range(len(read))]
+        else:
+            refused |= failed
+    return judged
 
 
-def _tried(asked: Asked, work: Callable[..., T], *given: Any) -> T | BiogripError:
-    """Return what work on a trace gives, or the error by which it fails, whatever that is."""
+@contextmanager
+def _caught(asked: Asked, refused: dict[str, str]) -> Iterator[None]:
+    """Take the error by which work on a trace fails, whatever that is, for its message."""
     try:
-        return work(*given)
+        yield
     except BiogripError as error:
-        return error
+        refused[asked.name] = str(error)
     except BrokenPipeError:
         # Whoever reads the progress has gone.
         raise
     except Exception as error:
         where = traceback.extract_tb(error.__traceback__)[-1]
-        return BiogripError(
+        refused[asked.name] = (
             f"{visible(asked.name)}: the fit failed, which is a fault of biogrip and not of the "
             f"trace: {type(error).__name__}: {error} ({Path(where.filename).name}, line "
             f"{where.lineno}). Please report it, with the trace if it may be shared."
@@ -350,9 +338,7 @@ def data_of(
 
     Given are the blocks of the config that the user has set.
     """
-    recording, experiment = diagnosis.recording, diagnosis.experiment
-    assert recording
-    assert experiment
+    recording, experiment = diagnosis.identified
     load = load_in_words((recording, experiment), case, given)
     tried = diagnosis.models.answers if diagnosis.models else ()
     return {
@@ -362,7 +348,7 @@ def data_of(
         **({"load": load} if load else {}),
         **trace_data(diagnosis),
         "without_model": diagnosis.without_model(case.block.identifiability.at_s).data(),
-        "assumed": _assumed(diagnosis, case, list(tried or case.models)),
+        "assumed": _assumed(experiment, case, list(tried or case.models)),
         # What the user does not set; uncertainties are no gripper.
         "by_default": [
             name
@@ -373,10 +359,8 @@ def data_of(
     }
 
 
-def _assumed(diagnosis: Diagnosis, case: Case, tried: Sequence[str]) -> dict[str, Any]:
+def _assumed(found: Experiment, case: Case, tried: Sequence[str]) -> dict[str, Any]:
     """Return what an identification relies on: its model, and a config that repeats it."""
-    found = diagnosis.experiment
-    assert found
     asked = case.block.identifiability
     blocks = ["instrument", "protocol", "search_range", "measurement", "models", "least_squares"]
     blocks += ["gripper"] if case.instrument.has_jaws else []

@@ -99,10 +99,7 @@ _OF_READINGS = ("misfit_rad", "noise_rad", "scatter_rad", "offset_rad", "drift_r
 def as_written(data: Mapping[str, Any]) -> dict[str, Any]:
     """Return the result of a trace, `data_of`, as it comes back from its JSON file."""
     # Assumptions, which must be repeatable, are not rounded.
-    found: dict[str, Any] = json.loads(
-        json.dumps(rounded_numbers(data) | {"assumed": data["assumed"]})
-    )
-    return found
+    return json.loads(json.dumps(rounded_numbers(data) | {"assumed": data["assumed"]}))
 
 
 def write_result(path: Path, data: Mapping[str, Any], made_from: str) -> None:
@@ -124,11 +121,10 @@ def read_result(path: Path, made_from: str) -> dict[str, Any]:
 
 
 def _renamed(data: Any, names: Mapping[str, str]) -> Any:
-    if isinstance(data, list):
-        return [_renamed(each, names) for each in data]
-    if not isinstance(data, dict):
-        return data
-    return {names.get(key, key): _renamed(each, names) for key, each in data.items()}
+    def renamed(own: dict[str, Any]) -> dict[str, Any]:
+        return {names.get(key, key): each for key, each in own.items()}
+
+    return json.loads(json.dumps(data), object_hook=renamed)
 
 
 def _in_units(name: str, read: Channel) -> str:
@@ -152,8 +148,8 @@ def table_of(outcome: Outcome) -> tuple[list[str], list[list[Any]]]:
             "fixed": "; ".join(each.get("fixed", ())),
             REASONS: " ".join(each["reasons"]),
             METHODS: " ".join(set_up_in_words(each)),
+            LINEAR: "yes" if each["without_model"]["is_linear"] else "no",
         }
-        row[LINEAR] = "yes" if each["without_model"]["is_linear"] else "no"
         without = each["without_model"]["quantities"]
         if not each["assumed"]["identifiability"]["at_s"]:
             without = [own for own in without if own["kind"] in (LEVEL, EXPONENT)]

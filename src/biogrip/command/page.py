@@ -62,9 +62,7 @@ def draw_level(diagnosis: Diagnosis, data: Mapping[str, Any]) -> Figure:
 
     Where one level was held, readings over it are drawn, too.
     """
-    experiment, recording = diagnosis.experiment, diagnosis.recording
-    assert experiment is not None
-    assert recording is not None
+    recording, experiment = diagnosis.identified
     first_s, last_s = data["without_model"]["covered_s"]
     times = np.geomspace(first_s, last_s, _BAND)
     told = diagnosis.without_model(times.tolist(), [LEVEL]).told
@@ -95,9 +93,7 @@ def draw_best(diagnosis: Diagnosis) -> Figure:
 
     Where readings spread over decades after the protocol's start, time is counted from there.
     """
-    experiment, recording = diagnosis.experiment, diagnosis.recording
-    assert experiment is not None
-    assert recording is not None
+    recording, experiment = diagnosis.identified
     found = {finding.quantity.label: finding.value for finding in diagnosis.findings}
     fit = fit_of(experiment, found, recording.time_s, recording.readings, recording.sd)
     start_s = recording.onset_s or 0.0
@@ -213,5 +209,4 @@ def beyond(one: Mapping[str, Any], shared: Mapping[str, Any]) -> dict[str, Any]:
 
 def _as_yaml(block: Mapping[str, Any]) -> str:
     dumper: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
-    text: str = yaml.dump(block, Dumper=dumper, sort_keys=False, allow_unicode=True)
-    return text
+    return yaml.dump(block, Dumper=dumper, sort_keys=False, allow_unicode=True)

@@ -14,7 +14,6 @@ import os
 import re
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
@@ -34,7 +33,6 @@ from biogrip.identify.other_fits import Trace
 from biogrip.physics.instruments import GRIPPER, INSTRUMENTS, Instrument
 from biogrip.physics.models import ALIASES, CANDIDATES
 from biogrip.study.experiment_blocks import LONGEST_S, SHORTEST_S
-from biogrip.study.measurement_block import ARRAYS, READINGS, MeasurementBlock
 from biogrip.study.messages import checked, with_numbers
 from biogrip.study.source import (
     HOLD,
@@ -49,13 +47,13 @@ from biogrip.study.source import (
 from biogrip.study.study import Case, load_study, read_configs
 from biogrip.terminal import visible
 from biogrip.traces.columns import (
-    Columns,
     held_unit,
     listed,
     number_and_unit,
     place,
     trace_file_problem,
 )
+from biogrip.traces.measurement_block import ARRAYS, READINGS, ByOptions, MeasurementBlock
 from biogrip.traces.reader import Recording, read_recording, recording_of_arrays
 
 MODEL = "generalized_maxwell"
@@ -144,7 +142,7 @@ class Asked:
         renamed = {_BY_SPHERE.get(key, key): value for key, value in measured.items()}
         return {**blocks, "measurement": renamed}
 
-    def read(self, columns: Columns) -> Recording:
+    def read(self, columns: MeasurementBlock) -> Recording:
         """Read the trace; a `BiogripError` has file, line and column, or array and index."""
         if self.arrays:
             return recording_of_arrays(columns, *self.arrays)
@@ -172,8 +170,7 @@ def _laid_over(blocks: dict[str, Any], setting: Setting) -> dict[str, Any]:
         path, value = ("sample",), {"model": sample.name, "branches": sample.branches}
     for part in reversed(path):
         value = {part: value}
-    found: dict[str, Any] = overlaid(blocks, value)
-    return found
+    return overlaid(blocks, value)
 
 
 def read_trace(asked: Asked) -> tuple[Recording, Case]:
@@ -182,7 +179,7 @@ def read_trace(asked: Asked) -> tuple[Recording, Case]:
     A `BiogripError` has file, line and column, or setting, that cannot be used.
     """
     case, recording = case_of(asked)
-    columns = replace(case.columns, by_options=True)
+    columns = ByOptions(**vars(case.block.measurement))
     # What its protocol follows from was read before the protocol's start was known.
     recording = replace(recording, read=columns) if recording else asked.read(columns)
     return replace(recording, remarks_before=remarks_on_hold(recording, case, asked.given)), case
@@ -261,15 +258,15 @@ def _with_instrument(
     measurement = with_numbers(MeasurementBlock, measurement)
     kind = given.get("instrument", instrument.kind)
     block = checked(MeasurementBlock, measurement)[0]
-    controlled = instrument.controlled if block is None else block.columns.controlled
+    controlled = (instrument if block is None else block.instrument).controlled
     found = {**merged, "instrument": kind, "measurement": measurement}
-    of_column = measurement.get(LOAD[-1]) is not None
+    phase = {"duration_s": 1.0, controlled.column: 1.0}
+    held = {**found, "protocol": {"phases": [phase]}}
     if instrument.sweeps:
         if level is not None:
             raise BiogripError(f"{by}: is of a trace in time, not of a sweep; leave it out.")
-        held = {"phases": [{"duration_s": 1.0, controlled.column: 1.0}]}
-        return {**found, "protocol": held}, None, None
-    if level is None and not of_column:
+        return held, None, None
+    if level is None and measurement.get(LOAD[-1]) is None:
         if "protocol" in given or instrument.has_jaws:
             return found, None, None
         if not instrument.relative:
@@ -280,16 +277,16 @@ def _with_instrument(
             )
     if block is None:
         # The study will say why.
-        level = None
-    elif level is not None:
-        level = controlled.in_si(*held_unit(level, controlled, by))
-    own = None
-    # Whoever uses the trace says what is wrong.
-    with suppress(BiogripError):
-        own = asked.read(block.columns) if block else None
-    phase = {"duration_s": 1.0, controlled.column: 1.0 if level is None else level}
+        return held, None, None
+    if level is not None:
+        phase[controlled.column] = controlled.in_si(*held_unit(level, controlled, by))
+    try:
+        own = asked.read(block)
+    except BiogripError:
+        # Whoever uses the trace says what is wrong.
+        return held, None, None
     record, start_s = None, measurement.get("start_s")
-    if own is not None and own.load is not None:
+    if own.load is not None:
         first_s, first = own.load[0].tolist()
         # A load that is there in the first row came before it: at 0, as one that is held.
         if start_s is None:
@@ -299,8 +296,8 @@ def _with_instrument(
         largest = max(record[:, 1], key=abs)
         if instrument.relative:
             record[:, 1] /= largest
-        phase = {"duration_s": float(record[-1, 0]), controlled.column: float(largest)}
-    elif own is not None:
+        phase |= {"duration_s": float(record[-1, 0]), controlled.column: float(largest)}
+    else:
         first = start_s or min(float(own.time_s[0]), 0.0)
         lasts = float(own.time_s[-1]) - first
         phase["duration_s"] = lasts if lasts > 0 else 1.0
@@ -310,7 +307,7 @@ def _with_instrument(
                 f"to the last reading; allowed are {SHORTEST_S:g} to {LONGEST_S:g} s. Is the unit "
                 "of time right? Or say when it started (--start)."
             )
-    return {**found, "protocol": {"phases": [phase]}}, own, record
+    return held, own, record
 
 
 def _from(load: Array, start_s: float) -> Array:
@@ -484,14 +481,14 @@ def read_table(
 
 def _parts(traces: Sequence[Path], set_by: Sequence[Mapping[str, str]]) -> list[str]:
     """Return what tells each trace from others of its file: cells of its row that differ there."""
-    differ = defaultdict[str, dict[str, set[str]]](lambda: defaultdict(set))
+    differ = defaultdict[tuple[str, str], set[str]](set)
     # Resolved, so that links to one file are found.
     files = [os.path.realpath(trace) for trace in traces]
     for file, cells in zip(files, set_by, strict=True):
         for name, cell in cells.items():
-            differ[file][name].add(cell)
+            differ[file, name].add(cell)
     return [
-        " ".join(cell for name, cell in cells.items() if cell and len(differ[file][name]) > 1)
+        " ".join(cell for name, cell in cells.items() if cell and len(differ[file, name]) > 1)
         for file, cells in zip(files, set_by, strict=True)
     ]
 
@@ -549,10 +546,10 @@ def load_in_words(trace: Trace, case: Case, given: Mapping[str, Any]) -> str:
 
     Given are the blocks of the config that the user has set.
     """
-    (recording, experiment), controlled = trace, case.columns.controlled
-    form, start_s = recording.form, case.columns.start_s or 0.0
+    (recording, experiment), measured = trace, case.block.measurement
+    controlled, start_s = measured.instrument.controlled, measured.start_s or 0.0
     if recording.load is not None and experiment.record is not None:
-        column, loads = form["columns"]["load"], experiment.record[:, 1]
+        column, loads = recording.form["columns"]["load"], experiment.record[:, 1]
         if case.instrument.relative:
             loads = loads * getattr(case.block.protocol.phases[0], controlled.column)
         ends = loads.min(), loads.max()
@@ -565,7 +562,7 @@ def load_in_words(trace: Trace, case: Case, given: Mapping[str, Any]) -> str:
         return ""
     number, unit = held_unit(given[HOLD[0]], controlled)
     start = "its start, as fitted," if experiment.fit_start else f"{start_s:g} s"
-    what = f"{_with_unit(f'{number:g}', unit)} from {start} to {form['last_s']:g} s"
+    what = f"{_with_unit(f'{number:g}', unit)} from {start} to {recording.form['last_s']:g} s"
     return f"Held: {what}{_contact(case)}."
 
 
@@ -577,7 +574,7 @@ def _contact(case: Case) -> str:
 
 def _shrinks(recording: Recording, case: Case) -> tuple[str, ...]:
     """Return a sentence if a sphere was drawn back, where Hertz's contact has no such sum."""
-    if recording.load is None or case.columns.sphere_m is None:
+    if recording.load is None or case.block.measurement.sphere is None:
         return ()
     time_s, loads = recording.load[recording.load[:, 0] <= recording.form["last_s"]].T
     most = np.maximum.accumulate(loads)

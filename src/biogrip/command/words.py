@@ -13,8 +13,8 @@ from biogrip.judging.verdicts import FIT_REJECTED, NOT_DETERMINED
 from biogrip.judging.without_model import BEYOND, EXPONENT, FLOW, LEVEL, LOSS
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.models import CANDIDATES
-from biogrip.study.measurement_block import KNOWN_NOISE
 from biogrip.terminal import aligned, visible, visible_lines
+from biogrip.traces.measurement_block import KNOWN_NOISE
 
 # Instrument whose readings span decades: their misfit is told over their noise.
 _SWEEPS = "oscillation"
@@ -334,9 +334,8 @@ def set_up_in_words(found: Mapping[str, Any]) -> list[str]:
         text = f"Its arms of {own['arm_length_m']:g} m have a stiffness of {' and '.join(arms)}"
         said.append(f"{text} N m/rad, and stand at {own['reference_angle_deg']:g} degrees.")
     fixed = f" with {', '.join(found['fixed'])}" if "fixed" in found else ""
-    along = [name for name in ("offset", "drift") if f"{name}_rad" in found]
-    along += ["drift"] if "drift_rad_per_s" in found else []
-    along += ["start"] if "onset_s" in found else []
+    terms = {"offset_rad": "offset", "drift_rad_per_s": "drift", "onset_s": "start"}
+    along = [name for key, name in terms.items() if key in found]
     also = f", along with the instrument's {' and '.join(along)}" if along else ""
     title = found["model_title"].removesuffix(" model")
     said.append(f"The model ({title}{fixed}) was fitted by least squares{also}; {_noise(found)}.")
@@ -351,9 +350,9 @@ def set_up_in_words(found: Mapping[str, Any]) -> list[str]:
 
 def preferred_in_words(found: Mapping[str, Any]) -> list[str]:
     """Return a sentence on the model that is preferred to that of the fit, if one is."""
-    lowest = min(found["models"] or [], key=lambda row: row["delta_bic"], default=None)
-    if not found["preferred_model"] or lowest is None:
+    if not found["preferred_model"]:
         return []
+    lowest = min(found["models"], key=lambda row: row["delta_bic"])
     count = len(found["models"]) + len(found["models_spared"])
     return [
         f"Of {count} models that were compared, that of the lowest BIC is another: "

@@ -81,10 +81,8 @@ def _finding(finding: Finding, *, rejected: bool) -> dict[str, Any]:
 
 def trace_data(diagnosis: Diagnosis) -> dict[str, Any]:
     """Return all that `identify` says of a trace: `judged_data`, and what it stands on."""
-    experiment, recording = diagnosis.experiment, diagnosis.recording
+    recording, experiment = diagnosis.identified
     fit, models = diagnosis.fit, diagnosis.models
-    assert experiment is not None
-    assert recording is not None
     assert fit is not None
     assert models is not None
     instrument, said = experiment.instrument, judged_data(diagnosis)

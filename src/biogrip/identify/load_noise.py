@@ -66,7 +66,7 @@ def tare_of(experiment: Experiment, recording: Recording) -> float:
     if these rows precede the start. Of a sphere nothing is linear.
     """
     record, load, start_s = experiment.record, recording.load, recording.read.start_s or 0.0
-    if record is None or load is None or experiment.instrument.relative or recording.read.sphere_m:
+    if record is None or load is None or experiment.instrument.relative or recording.read.sphere:
         return 0.0
     same = np.abs(load[:, 1] - load[0, 1]) < levels.HELD * np.ptp(load[:, 1])
     first = load[: int(np.argmin(same)), 1]

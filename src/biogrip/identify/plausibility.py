@@ -72,8 +72,8 @@ def check_recording(
     responses = lag_course(torque, _LAG_SHARES)(time_s)
     nuisance = experiment.nuisance(time_s)
     either = (amplitudes, rest), (_, mirrored) = _either_sign(trace, responses, nuisance)
-    where = recording.extent(recording.read.reading)
-    read, controlled = recording.read.quantity, instrument.controlled.name
+    where = recording.extent(recording.read.reading_column)
+    read, controlled = recording.read.instrument.read, instrument.controlled.name
     combined, least = min(either, key=itemgetter(1))
     used = int(np.count_nonzero(combined))
     is_constant = not instrument.deforms and len(trace) * np.var(trace) <= least
@@ -84,10 +84,11 @@ def check_recording(
         usual = _APART * np.quantile(off, 0.9)
         if 0 < usual < np.max(off):
             sample = int(np.argmax(off > usual))
+            there = recording.place(sample, recording.read.reading_column)
             raise BiogripError(
-                f"{recording.place(sample, recording.read.reading)}: found {trace[sample]:.6g}"
-                f"{unit}, far from nearly all others, and no response to the {controlled} beside "
-                "it; allowed are readings. What is none has no number in its cell."
+                f"{there}: found {trace[sample]:.6g}{unit}, far from nearly all others, and no "
+                f"response to the {controlled} beside it; allowed are readings. What is none has "
+                "no number in its cell."
             )
         raise BiogripError(
             f"{where}: found no response to the {controlled}, but {plain(trace.mean())}{unit} "
@@ -166,12 +167,12 @@ def _check_times(recording: Recording, torque: Course) -> None:
         hint = f" If the protocol starts after readings, or not at 0 of the clock, {how}."
     for sample in np.flatnonzero((time_s < earliest) | (time_s > end_s + slack))[:1]:
         raise BiogripError(
-            f"{recording.place(sample, columns.time)}: found "
+            f"{recording.place(sample, columns.axis_column)}: found "
             f"{clock_s[sample]:.12g} s, allowed is the protocol's time, {begins:g} to "
             f"{begins + end_s:g} s.{hint}"
         )
     raise BiogripError(
-        f"{recording.extent(columns.time)}: found only {clock_s[0]:g} to "
+        f"{recording.extent(columns.axis_column)}: found only {clock_s[0]:g} to "
         f"{clock_s[-1]:g} s of the protocol's {end_s:g} s, allowed are at least {shortest:g} s of "
         f"it.{hint}"
     )
@@ -188,7 +189,7 @@ def _check_turn(
 
     if fits(1.0):
         return None
-    hint = _other_units(recording.units[1], columns.quantity.units, fits)
+    hint = _other_units(recording.units[1], columns.instrument.read.units, fits)
     alone = f"without any sample the arm turns by {free:.3g} rad"
     if noise_sd is not None and levels.FAR_ABOVE * noise_sd < turn < smallest:
         return (
@@ -203,7 +204,7 @@ def _check_turn(
         )
     sample = int(np.argmax(np.abs(recording.readings)))
     raise BiogripError(
-        f"{recording.place(sample, columns.reading)}: found "
+        f"{recording.place(sample, columns.reading_column)}: found "
         f"{recording.readings[sample]:.3g} rad as the largest rotation, and {turn:.3g} rad as "
         f"the largest with the noise smoothed out; allowed is {limit}.{hint}"
     )

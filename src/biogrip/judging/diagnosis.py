@@ -84,6 +84,13 @@ class Diagnosis:
     """Limits of a fitted onset, from it."""
 
     @property
+    def identified(self) -> tuple[Recording, Experiment]:
+        """The trace and what was assumed of it, of a trace that was identified."""
+        assert self.recording is not None
+        assert self.experiment is not None
+        return self.recording, self.experiment
+
+    @property
     def status(self) -> str:
         """Status of the fit by these notes: ok, doubtful or rejected."""
         return compute_status(self.notes)

@@ -23,8 +23,8 @@ from biogrip.processes import collect_less
 from biogrip.records.rows import seeds_of
 from biogrip.study.case_blocks import CaseBlock, Identifiability
 from biogrip.study.config import StudyConfig
-from biogrip.study.measurement_block import MeasurementBlock
 from biogrip.study.study import Case, Study
+from biogrip.traces.measurement_block import MeasurementBlock
 
 STUDY_KEYS = tuple(field.name for field in fields(StudyConfig))
 """All keys of a study."""

@@ -106,13 +106,14 @@ def calibrate_gripper(case: Case, gripper: Path, records: Path) -> None:
 
 def record(case: Case, recorded: Path, measurements: Path) -> None:
     """Read, check and convert the user's file; errors name file, line and column."""
-    if case.columns.load is not None:
+    measured = case.block.measurement
+    if measured.load is not None:
         raise BiogripError(f"{place(recorded)}: measurement.load is only for biogrip identify.")
     # Imported here: a simulated trace needs neither.
     from biogrip.identify.prepare import prepare
     from biogrip.traces.reader import read_recording
 
-    trace, _ = prepare(read_recording(recorded, case.columns), case.experiment)
+    trace, _ = prepare(read_recording(recorded, measured), case.experiment)
     remarks = tuple(trace.remarks())
     for remark in remarks:
         warn(f"{place(recorded)}: {remark}")

@@ -35,9 +35,9 @@ from biogrip.study.experiment_blocks import (
     SampleBlock,
     fixed_complaints,
 )
-from biogrip.study.measurement_block import MeasurementBlock
 from biogrip.study.messages import checked
 from biogrip.study.source import overlaid
+from biogrip.traces.measurement_block import MeasurementBlock
 
 CALIBRATED = "calibrated"
 
@@ -258,7 +258,7 @@ class CaseBlock(Shared):
     def _sampling_complaints(self) -> Iterator[Complaint]:
         measured = self.measurement
         samples = self.protocol.end_s * measured.rate_Hz + 1
-        needed = len(self.searched) + measured.fits_offset + measured.fits_drift + 1
+        needed = len(self.searched) + sum(measured.along.values()) + 1
         most = MOST_SAMPLES if measured.coloured else _MOST_SAMPLES
         if not needed <= samples <= most:
             found = f"found {measured.rate_Hz:g}, which gives {counted(f'{samples:.6g}', 'sample')}"

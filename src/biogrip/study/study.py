@@ -37,7 +37,6 @@ from biogrip.study.source import (
     read_source,
     values_in,
 )
-from biogrip.traces.columns import Columns
 
 
 @dataclass(frozen=True)
@@ -97,11 +96,6 @@ class Case:
     def times_s(self) -> Array:
         """Times of a simulated trace, (n_samples,)."""
         return sample_times(self.torque.end_s, self.block.measurement.rate_Hz)
-
-    @property
-    def columns(self) -> Columns:
-        """Columns of a recorded trace's file."""
-        return self.block.measurement.columns
 
     @property
     def instrument(self) -> Instrument:
@@ -182,15 +176,17 @@ class Case:
             self.sample,
             self.block.fixed,
             self.instrument,
-            offset=measurement.fits_offset,
-            drift=measurement.fits_drift,
+            offset=measurement.along["offset"],
+            drift=measurement.along["drift"],
             noise_sd=measurement.noise_rad,
             noise_share=measurement.noise_share,
             coloured=measurement.coloured,
             uncertainty=uncertainty.by_part if uncertainty else {},
             fit_start=measurement.fit_start,
             record=self.record,
-            undeclared=measurement.undeclared,
+            undeclared=frozenset(
+                it for it in measurement.along if getattr(measurement, it) is None
+            ),
             given_ranges=frozenset(name for name, it in ranges.items() if it != usual[name]),
             simulated=not self.recorded,
             name=self.name,

@@ -7,7 +7,6 @@ A unit is stated, stands at the end of the column's name, as in ``rotation_urad`
 import re
 from collections.abc import Collection, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from math import pi
 from pathlib import Path
 from unicodedata import normalize
@@ -17,10 +16,7 @@ from biogrip.physics.instruments import (
     DISPLACEMENT,
     INSTRUMENTS,
     MODULUS,
-    PARTNERS,
-    ROTATION,
     Channel,
-    under_sphere,
 )
 from biogrip.terminal import visible
 
@@ -77,94 +73,9 @@ _UNITS |= {unit for each in INSTRUMENTS.values() for unit in each.read.units}
 _NUMBERED = re.compile(r"[ _]?(\d+|\(\d*\)|\[\d*\])$")
 # A number with what may be its unit behind it.
 _SIZED = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s*(.*?)\s*", re.I)
-# Keys that no option of the command sets but `--set`, with what they may say.
-_BY_SET = {
-    "time_unit": "UNIT",
-    "frequency_unit": "UNIT",
-    "partner_unit": "UNIT",
-    "loss_sd": "COLUMN",
-    "rotation_unit": "UNIT",
-    "reading_unit": "UNIT",
-    "load_unit": "UNIT",
-    "block": "N",
-    "average_repeated": "true",
-    "scale": "-1",
-}
 _MOST_LISTED = 50
 _LONGEST_SHOWN = 40
 _LONGEST_PATH = 200
-
-
-@dataclass(frozen=True)
-class Columns:
-    """Names and units of the columns of a trace, and which of its rows are used.
-
-    What has no words here is as the key of the config's `measurement` of its name says.
-    """
-
-    time: str
-    """Name of the column of times, or of a sweep's frequencies."""
-    reading: str
-    """Name of that of what the instrument reads."""
-    time_unit: str | None = None
-    """Key of its `AXES`; None, here and below, if the file has the unit."""
-    reading_unit: str | None = None
-    scale: float = 1.0
-    start_s: float | None = None
-    by_options: bool = False
-    """True if command-line options set them, false for config keys; used in messages."""
-    sd: str | None = None
-    quantity: Channel = ROTATION
-    """What is read."""
-    block: int | None = None
-    average_repeated: bool = False
-    from_s: float | None = None
-    until_s: float | None = None
-    rows: Mapping[str, str | float] | None = None
-    load: str | None = None
-    load_unit: str | None = None
-    partner: Channel | None = None
-    """What a sweep reads beside the quantity."""
-    partner_column: str = ""
-    """Name of its column."""
-    partner_unit: str | None = None
-    loss_sd: str | None = None
-    sphere_m: float | None = None
-    """Radius of the sphere whose force and indentation are read, if there is one."""
-
-    @property
-    def axis(self) -> str:
-        """What readings follow: a key of `AXES`."""
-        return "frequency" if self.partner else "time"
-
-    @property
-    def named(self) -> dict[str, str]:
-        """Names of the columns by the key that says them, in the order of reading."""
-        names = {self.axis: self.time, self.quantity.name: self.reading}
-        names |= {self.partner.name: self.partner_column} if self.partner else {}
-        more = {"sd": self.sd, "loss_sd": self.loss_sd, "load": self.load}
-        return names | {key: name for key, name in more.items() if name is not None}
-
-    @property
-    def controlled(self) -> Channel:
-        """What was controlled."""
-        instrument = INSTRUMENTS[self.quantity.name]
-        return (under_sphere(instrument, self.sphere_m) if self.sphere_m else instrument).controlled
-
-    def said_by(self, *keys: str) -> str:
-        """Return the options or config keys that say something, for messages."""
-        if self.by_options:
-            return " and ".join(map(_option, keys))
-        values = [f"{key}: {_BY_SET.get(key, 'UNIT')}".removesuffix(": UNIT") for key in keys]
-        return f"{' and '.join(values)} under measurement"
-
-
-def _option(key: str) -> str:
-    if key in _BY_SET:
-        return f"--set measurement.{key}={_BY_SET[key]}"
-    if key in PARTNERS:
-        return f"--reading {key}=COLUMN"
-    return "--reading" if key in INSTRUMENTS else f"--{key}"
 
 
 def unit_of(
@@ -182,7 +93,9 @@ def unit_of(
     which of name, cell and statement contradict each other.
     """
     where, choices = place(path, column=column), ", ".join(allowed)
-    at_end, in_row = _unit_at_end(column, allowed), unit_in_cell(below, allowed)
+    # A name may end with something other than a unit, as in rotation_left or phi (2).
+    ends = (known_unit(end, allowed) for end in _endings(column, *_SURELY, *_PERHAPS))
+    at_end, in_row = next(filter(None, ends), None), unit_in_cell(below, allowed)
     unit = (at_end or in_row) if given is None else known_unit(given, allowed)
     if given is not None and unit is None:
         raise BiogripError(f"{where}: found the unit '{given}', allowed are {choices}.")
@@ -285,12 +198,6 @@ def _endings(column: str, *patterns: str) -> list[str]:
     name = re.sub(r"_per_([^\W_]+)$", r" 1/\1", plain_name(column))
     found = filter(None, (re.search(pattern, name) for pattern in patterns))
     return ["".join(filter(None, match.groups())).strip() for match in found]
-
-
-def _unit_at_end(column: str, allowed: Collection[str]) -> str | None:
-    # A name may end with something other than a unit, as in rotation_left or phi (2).
-    ends = _endings(column, *_SURELY, *_PERHAPS)
-    return next(filter(None, (known_unit(end, allowed) for end in ends)), None)
 
 
 def _said_at_end(column: str) -> str | None:

@@ -15,7 +15,8 @@ from biogrip.errors import BiogripError, nearest
 from biogrip.physics.instruments import INSTRUMENTS, PHASE, ROTATION
 from biogrip.physics.protocol import joined
 from biogrip.terminal import visible
-from biogrip.traces.columns import AXES, Columns, listed, place, shortened, unit_of
+from biogrip.traces.columns import AXES, listed, place, shortened, unit_of
+from biogrip.traces.measurement_block import UNREAD, MeasurementBlock
 from biogrip.traces.tables import (
     BLANKS,
     DAY_S,
@@ -63,7 +64,7 @@ class Recording:
     """Line number of each reading in the file, from 1, or index in its array, (n_samples,)."""
     path: Path | None = None
     """The file; None for arrays."""
-    read: Columns = field(default_factory=lambda: Columns("time_s", "readings"))
+    read: MeasurementBlock = UNREAD
     """What was read of it."""
     units: tuple[str, str] = ("s", "1")
     """Units of the times and of the readings in the file."""
@@ -79,14 +80,12 @@ class Recording:
     """Times by the clock of readings that were left out where a sample may jump."""
     load_noise: float = 0.0
     """Standard deviation of what was smoothed out of `load`, as a share of its largest value."""
-    suspicion: str | None = None
-    """Sentence on a reading that is hardly plausible."""
     form: Mapping[str, Any] = field(default_factory=dict)
     """What was recognised in the file, for people to check before they believe a fit; `read_as` of
     the JSON file."""
     remarks_before: tuple[str, ...] = ()
-    """Sentences that come before: of an earlier reading, where `form` is lost, or on what was
-    held."""
+    """Sentences that come before: of an earlier reading, where `form` is lost, on what was held, or
+    on a reading that is hardly plausible."""
     load: Array | None = None
     """Times and loads, or deformations, in SI units, (n, 2), where they are read: of all rows, used
     or not."""
@@ -114,17 +113,17 @@ class Recording:
 
     def remarks(self) -> list[str]:
         """Return sentences on what was left out, and on what is hardly plausible."""
-        said = [*self.remarks_before, *filter(None, [self.suspicion])]
+        said = [*self.remarks_before]
         if self.gaps:
             rows = f"{counted(self.gaps, 'row')} of {len(self.time_s) + self.gaps}"
             said.append(f"Left out for want of a number: {rows}.")
         form = self.form
-        if "averaged" in form:
+        if form.get("averaged"):
             axis = _PLURALS[self.read.axis]
             said.append(f"Averaged at repeated {axis}: {counted(form['averaged'], 'reading')}.")
-        if "outside" in form:
+        if form.get("outside"):
             said.append(f"Left out by from_s and until_s: {counted(form['outside'], 'reading')}.")
-        if "others" in form:
+        if form.get("others"):
             said.append(f"Left out, for rows asks for others: {counted(form['others'], 'row')}.")
         if self.load_noise:
             said.append(
@@ -159,11 +158,12 @@ def is_usual(recording: Recording) -> bool:
         and not any(key in form for key in (*odd, "unclear", "clock"))
         and columns.block is None
         and columns.load is None
-        and (columns.time, columns.reading) == ("time_s", columns.quantity.column)
+        and (columns.axis_column, columns.reading_column)
+        == ("time_s", columns.instrument.read.column)
     )
 
 
-def read_recording(path: Path, columns: Columns) -> Recording:
+def read_recording(path: Path, columns: MeasurementBlock) -> Recording:
     """Read the columns of a recorded trace from a file.
 
     The header is the line that has the columns, or has a row of units below it; of several such
@@ -175,24 +175,25 @@ def read_recording(path: Path, columns: Columns) -> Recording:
     row is left out and counted; nothing is interpolated. A `BiogripError` has file, line and column
     of what cannot be used, and what is allowed.
     """
-    sheet, quantity = read_sheet(path, columns), columns.quantity
-    if columns.reading == quantity.name and quantity.name not in sheet.cells:
+    sheet, quantity = read_sheet(path, columns), columns.instrument.read
+    if columns.reading_column == quantity.name and quantity.name not in sheet.cells:
         # As by --reading modulus, of a column modulus_Pa.
-        columns = replace(columns, reading=quantity.column)
+        usual: dict[str, Any] = {quantity.name: quantity.column}
+        columns = replace(columns, **usual)
     tables, index = find_tables(path, sheet, columns)
     table = tables[index]
     header_line = int(sheet.numbers[table.at]) or None
-    times = [sheet.cells[table.first : table.end, i] for i in table.indices(columns.time)[:1]]
-    clock = any(is_clock(cells.tolist()) for cells in times)
-    first = next((cells[0] for cells in times if len(cells)), "")
-    if ":" in first and not clock:
+    axis, rows = columns.axis_column, slice(table.first, table.end)
+    times = [cell for i in table.indices(axis)[:1] for cell in sheet.cells[rows, i].tolist()]
+    clock = is_clock(times)
+    if ":" in "".join(times[:1]) and not clock:
         raise BiogripError(
-            f"{place(path, sheet.numbers[table.first], columns.time)}: found '{shortened(first)}'; "
+            f"{place(path, sheet.numbers[table.first], axis)}: found '{shortened(times[0])}'; "
             "allowed are numbers, or hh:mm:ss, alone or after a date as 2026-11-25 or 25.11.2026."
         )
     indices, units = _columns_of(path, header_line, table, columns, clock=clock)
     values, form = _numbers(path, sheet, table, indices, clock=clock)
-    lines, load = sheet.numbers[table.first : table.end], None
+    lines, load = sheet.numbers[rows], None
     if columns.load is not None:
         history, values = values[:, [0, -1]], values[:, :-1]
         numbers = ~np.any(np.isnan(history), axis=1)
@@ -205,6 +206,7 @@ def read_recording(path: Path, columns: Columns) -> Recording:
         {"column": table.names[i], "unit": unit} for i, unit in zip(indices, units, strict=True)
     )
     several = len(tables) > 1
+    found = _checked(path, columns, units, values[chosen], lines[chosen])
     form = {
         "encoding": sheet.encoding,
         "separator": _SEPARATORS[sheet.separator],
@@ -215,17 +217,14 @@ def read_recording(path: Path, columns: Columns) -> Recording:
         "blocks": len(tables) if several else None,
         "preamble": table.title or None,
         "columns": dict(zip(columns.named, names_and_units, strict=True)),
+        "rows": len(values),
+        **found.form,
+        "others": int(np.count_nonzero(~chosen)) or None,
     }
-    others = int(np.count_nonzero(~chosen)) or None
-    form |= {"rows": len(values), "gaps": None, "averaged": None, "outside": None, "others": others}
-    found = _checked(path, columns, units, values[chosen], lines[chosen])
-    form |= found.form
-    return replace(
-        found, form={key: value for key, value in form.items() if value is not None}, load=load
-    )
+    return replace(found, form={key: it for key, it in form.items() if it is not None}, load=load)
 
 
-def recording_of_arrays(columns: Columns, *arrays: Array) -> Recording:
+def recording_of_arrays(columns: MeasurementBlock, *arrays: Array) -> Recording:
     """Return a recording of times, readings and perhaps standard deviations, (n_samples,) each.
 
     Messages and units go by the names in `columns`; a row with a NaN is a gap. A `BiogripError`
@@ -245,7 +244,7 @@ def recording_of_arrays(columns: Columns, *arrays: Array) -> Recording:
 
 
 def _checked(
-    path: Path | None, columns: Columns, units: list[str], values: Array, lines: IntArray
+    path: Path | None, columns: MeasurementBlock, units: list[str], values: Array, lines: IntArray
 ) -> Recording:
     """Return the readings that are numbers, in SI units; refuse those that no trace can have.
 
@@ -276,16 +275,18 @@ def _checked(
         used &= clock <= columns.until_s
     values, lines, time_s = values[used], lines[used], time_s[used]
     _check_count(path, columns, len(values), without_number, f"usable {columns.axis}")
-    quantity, end = columns.quantity, "rad_per_s" if columns.partner else "s"
+    quantity, scale = columns.instrument.read, columns.scale or 1.0
+    end = "rad_per_s" if columns.partner else "s"
     form = {
         "gaps": without_number,
         "averaged": averaged or None,
         "outside": int(np.count_nonzero(~used)) or None,
+        "others": None,
         f"first_{end}": float(time_s[0]),
         f"last_{end}": float(time_s[-1]),
     }
-    readings, sd = quantity.in_si(values[:, 1], units[1], columns.scale), None
-    unit = quantity.units[units[1]] * columns.scale
+    readings, sd = quantity.in_si(values[:, 1], units[1], scale), None
+    unit = quantity.units[units[1]] * scale
     if columns.sd is not None:
         sd = values[:, 2] * abs(unit) * quantity.slope(values[:, 1] * unit)
     if columns.partner:
@@ -302,7 +303,7 @@ def _checked(
         (units[0], units[1]),
         sd=sd,
         gaps=without_number,
-        form={key: value for key, value in form.items() if value is not None},
+        form=form,
     )
 
 
@@ -318,19 +319,19 @@ def _as_in(names: Sequence[str]) -> str:
 
 
 def _both_moduli(
-    path: Path | None, columns: Columns, units: list[str], values: Array, lines: IntArray
+    path: Path | None, columns: MeasurementBlock, units: list[str], values: Array, lines: IntArray
 ) -> tuple[Array, Array]:
     """Return storage and loss moduli of a sweep, (n_rows,) in SI units."""
-    partner, read = columns.partner, columns.quantity
+    partner, read, scale = columns.partner, columns.instrument.read, columns.scale or 1.0
     assert partner is not None
     for row in np.flatnonzero(values[:, 0] <= 0)[:1]:
         found = f"found a frequency of {values[row, 0]:.3g}; allowed is one above 0"
         raise BiogripError(f"{place(path, lines[row])}: {found}.")
-    first = values[:, 1] * (read.units[units[1]] * columns.scale)
+    first = values[:, 1] * (read.units[units[1]] * scale)
     second = values[:, 2] * partner.units[units[2]]
     is_whole = read.name == "complex_modulus"
     if partner.unit == read.unit:
-        loss = second * columns.scale
+        loss = second * scale
         square = first**2 - loss**2
         storage = np.sign(square) * np.sqrt(np.abs(square)) if is_whole else first
     else:
@@ -341,7 +342,7 @@ def _both_moduli(
 
 
 def _columns_of(
-    path: Path, line: int | None, table: Table, columns: Columns, *, clock: bool
+    path: Path, line: int | None, table: Table, columns: MeasurementBlock, *, clock: bool
 ) -> tuple[list[int], list[str]]:
     """Return where the columns to read are in a table, and their units; or list what is wrong."""
     found: dict[int, str] = {}
@@ -379,22 +380,25 @@ def _columns_of(
     return list(found), units
 
 
-def _unit(path: Path | None, key: str, below: str, columns: Columns, units: list[str]) -> str:
+def _unit(
+    path: Path | None, key: str, below: str, columns: MeasurementBlock, units: list[str]
+) -> str:
     """Return the unit of a column; standard deviations have that of the readings before them."""
-    name, given, allowed = columns.named[key], columns.reading_unit, columns.quantity.units
-    unit_key = "rotation_unit" if columns.quantity == ROTATION else "reading_unit"
+    read, controlled = columns.instrument.read, columns.instrument.controlled
+    unit_key, allowed = "rotation_unit" if read == ROTATION else "reading_unit", read.units
+    given = columns.rotation_unit or columns.reading_unit
     if key == columns.axis:
-        given, unit_key, allowed = columns.time_unit, f"{key}_unit", AXES[columns.axis]
+        unit_key, allowed = f"{key}_unit", AXES[key]
+        given = columns.time_unit or columns.frequency_unit
     elif columns.partner and key == columns.partner.name:
-        allowed, given = columns.partner.units, columns.partner_unit
-        if given is None and allowed == columns.quantity.units:
-            given = columns.reading_unit
-        unit_key = "partner_unit"
+        unit_key, allowed = "partner_unit", columns.partner.units
+        given = columns.partner_unit or (given if allowed == read.units else None)
     elif key == "load":
-        given, unit_key, allowed = columns.load_unit, "load_unit", columns.controlled.units
-    elif key in ("sd", "loss_sd"):
-        given = units[1] if len(units) > 1 else given
-    return unit_of(path, name, given, allowed, columns.said_by(unit_key), below)
+        unit_key, allowed, given = "load_unit", controlled.units, columns.load_unit
+    elif key in ("sd", "loss_sd") and len(units) > 1:
+        given = units[1]
+    said_by = columns.said_by(unit_key)
+    return unit_of(path, columns.named[key], given, allowed, said_by, below)
 
 
 def _numbers(
@@ -455,7 +459,7 @@ def _numbers(
     return values, form
 
 
-def _chosen(path: Path, sheet: Sheet, table: Table, columns: Columns) -> BoolArray:
+def _chosen(path: Path, sheet: Sheet, table: Table, columns: MeasurementBlock) -> BoolArray:
     """Return which rows have the values of other columns that are asked for, (n_rows,)."""
     chosen = np.ones(table.end - table.first, bool)
     for column, wanted in (columns.rows or {}).items():
@@ -473,15 +477,17 @@ def _chosen(path: Path, sheet: Sheet, table: Table, columns: Columns) -> BoolArr
     return chosen
 
 
-def _load(path: Path, columns: Columns, history: Array, lines: IntArray, units: list[str]) -> Array:
+def _load(
+    path: Path, columns: MeasurementBlock, history: Array, lines: IntArray, units: list[str]
+) -> Array:
     _check_count(path, columns, len(history), 0)
     if columns.average_repeated:
         history, lines, _ = _averaged(history, lines)
     _check_order(path, columns, history[:, 0], lines)
     time_s = history[:, 0] * AXES[columns.axis][units[0]]
-    sizes = columns.controlled.in_si(history[:, 1], units[-1])
+    sizes = columns.instrument.controlled.in_si(history[:, 1], units[-1])
     # Before its contact a sphere neither presses nor indents.
-    return np.column_stack((time_s, np.maximum(sizes, 0.0) if columns.sphere_m else sizes))
+    return np.column_stack((time_s, np.maximum(sizes, 0.0) if columns.sphere else sizes))
 
 
 def _averaged(values: Array, lines: IntArray, first_sd: int = 2) -> tuple[Array, IntArray, int]:
@@ -499,7 +505,7 @@ def _averaged(values: Array, lines: IntArray, first_sd: int = 2) -> tuple[Array,
 
 
 def _check_count(
-    path: Path | None, columns: Columns, found: int, without_number: int, what: str = "row"
+    path: Path | None, columns: MeasurementBlock, found: int, without_number: int, what: str = "row"
 ) -> None:
     # Each row of a sweep has two readings.
     fewest = FEWEST_SAMPLES // (2 if columns.partner else 1)
@@ -513,7 +519,9 @@ def _check_count(
         )
 
 
-def _check_order(path: Path | None, columns: Columns, time: Array, lines: IntArray) -> None:
+def _check_order(
+    path: Path | None, columns: MeasurementBlock, time: Array, lines: IntArray
+) -> None:
     least = _SHORTEST_STEP * float(np.max(np.abs(time)))
     for row in np.flatnonzero(np.diff(time) <= least)[:1]:
         before, now = time[row : row + 2]
@@ -525,6 +533,6 @@ def _check_order(path: Path | None, columns: Columns, time: Array, lines: IntArr
             hint = f" The readings of equal {_PLURALS[columns.axis]} are averaged by {way}."
         by = f", by more than {least:.1g}" if now > before else ""
         raise BiogripError(
-            f"{place(path, lines[row + 1], columns.time)}: found {found} "
+            f"{place(path, lines[row + 1], columns.axis_column)}: found {found} "
             f"({earlier}), allowed are {_PLURALS[columns.axis]} that increase{by}.{hint}"
         )

@@ -27,7 +27,6 @@ from biogrip.digits import counted
 from biogrip.errors import BiogripError
 from biogrip.traces.columns import (
     AXES,
-    Columns,
     in_brackets,
     listed,
     place,
@@ -36,6 +35,7 @@ from biogrip.traces.columns import (
     trace_file_problem,
     unit_in_cell,
 )
+from biogrip.traces.measurement_block import MeasurementBlock
 
 BLANKS = " "
 SEPARATORS = (",", ";", "\t")
@@ -111,12 +111,12 @@ class Table:
         """Return which columns have a name."""
         return [i for i, name in enumerate(self.names) if plain_name(name) == plain_name(column)]
 
-    def common(self, columns: Columns) -> int:
+    def common(self, columns: MeasurementBlock) -> int:
         """Count the columns to read that it has."""
         return sum(bool(self.indices(name)) for name in columns.named.values())
 
 
-def read_sheet(path: Path, columns: Columns) -> Sheet:
+def read_sheet(path: Path, columns: MeasurementBlock) -> Sheet:
     """Read the cells of a text file.
 
     A `BiogripError` says that it is no file, or no text in UTF-8, UTF-16 or Windows-1252, or which
@@ -250,7 +250,7 @@ def _names(cells: Sequence[str]) -> set[str]:
     return {plain_name(_QUOTED.sub(r"\1", cell)) for cell in cells}
 
 
-def _separator(lines: Sequence[str], headers: Sequence[str], columns: Columns) -> str:
+def _separator(lines: Sequence[str], headers: Sequence[str], columns: MeasurementBlock) -> str:
     """Return the separator by which a line has most columns to read, or which most lines have."""
     wanted = {*map(plain_name, columns.named.values())}
 
@@ -266,7 +266,7 @@ def _separator(lines: Sequence[str], headers: Sequence[str], columns: Columns) -
     return max((*SEPARATORS[::-1], BLANKS), key=merit)
 
 
-def find_tables(path: Path, sheet: Sheet, columns: Columns) -> tuple[list[Table], int]:
+def find_tables(path: Path, sheet: Sheet, columns: MeasurementBlock) -> tuple[list[Table], int]:
     """Find the tables of a file, and the index of the block to read, or the only one that can be.
 
     A `BiogripError` lists the tables, if there is no such block, or several have the columns and
@@ -292,13 +292,13 @@ def find_tables(path: Path, sheet: Sheet, columns: Columns) -> tuple[list[Table]
     raise BiogripError(f"{place(path)}: found {found}, allowed {allowed}{''.join(shown + more)}")
 
 
-def _in_words(sheet: Sheet, table: Table, columns: Columns) -> str:
+def _in_words(sheet: Sheet, table: Table, columns: MeasurementBlock) -> str:
     """Return where a table is, some of its names, and the range of its times."""
     title = f", {table.title}" if table.title else ""
     names = [name for name in table.names if name and not name.endswith(":")]
     rows = counted(table.end - table.first, "row")
     said = f"line {sheet.numbers[table.at]}{title}; {listed(names, _NAMES_SHOWN)}; {rows}"
-    for time in table.indices(columns.time)[:1]:
+    for time in table.indices(columns.axis_column)[:1]:
         if table.end > table.first:
             first, last = map(shortened, sheet.cells[[table.first, table.end - 1], time])
             unit = table.units[time].strip("[]() ") if table.units else ""
@@ -306,7 +306,7 @@ def _in_words(sheet: Sheet, table: Table, columns: Columns) -> str:
     return said
 
 
-def _tables(sheet: Sheet, columns: Columns) -> list[Table]:
+def _tables(sheet: Sheet, columns: MeasurementBlock) -> list[Table]:
     found = (_header(sheet, at, columns) for at in sheet.headers)
     tables = [table for table in found if table is not None]
     ends = [0, *(_end(sheet, *pair) for pair in pairwise(tables)), _last_end(sheet)]
@@ -324,7 +324,7 @@ def _last_end(sheet: Sheet) -> int:
     return end
 
 
-def _header(sheet: Sheet, at: int, columns: Columns) -> Table | None:
+def _header(sheet: Sheet, at: int, columns: MeasurementBlock) -> Table | None:
     """Return a table whose names are on a line, or None if the line is no header.
 
     A header has the columns to read, or is above a row of units in brackets and rows of numbers,
@@ -339,7 +339,7 @@ def _header(sheet: Sheet, at: int, columns: Columns) -> Table | None:
     if below and not any(sheet.cells[below[0], len(names) :]):
         units = sheet.cells[below[0], : len(names)].tolist()
         numbers = _count_numbers(sheet.cells[below[1]]) if len(below) > 1 else 0
-        times = [units[i] for i in table.indices(columns.time)]
+        times = [units[i] for i in table.indices(columns.axis_column)]
         if (
             (is_step and numbers > _count_numbers(units))
             or (all(in_brackets(unit) for unit in units if unit) and (has_columns or numbers > 0))

@@ -18,6 +18,7 @@ from biogrip.physics.instruments import (
     ROTATION,
     STRAIN,
     STRESS,
+    Channel,
     Instrument,
     under_sphere,
 )
@@ -25,14 +26,12 @@ from biogrip.physics.noise import Noise
 from biogrip.traces.columns import (
     AXES,
     TIME_UNITS,
-    Columns,
     known_unit,
     length_m,
     trace_file_problem,
 )
 
 COLOURED = "coloured"
-NOISE_MODELS = ("white", COLOURED)
 KNOWN_NOISE = ("noise_rad", "sd", "noise_share")
 """Keys that say how large the noise is."""
 
@@ -47,6 +46,19 @@ _SWEPT = tuple(name for name, instrument in INSTRUMENTS.items() if instrument.sw
 _OF_SWEEPS = ("frequency", "frequency_unit", *PARTNERS, "partner_unit", "loss_sd")
 # Keys of simulated traces, too; the others are of a file.
 _OF_ALL = {"rate_Hz", "file", "noise", "noise_model", "offset", "drift"}
+# Keys that no option of the command sets but `--set`, with what they may say.
+_BY_SET = {
+    "time_unit": "UNIT",
+    "frequency_unit": "UNIT",
+    "partner_unit": "UNIT",
+    "loss_sd": "COLUMN",
+    "rotation_unit": "UNIT",
+    "reading_unit": "UNIT",
+    "load_unit": "UNIT",
+    "block": "N",
+    "average_repeated": "true",
+    "scale": "-1",
+}
 
 
 def _unit(allowed: Mapping[str, float]) -> BeforeValidator:
@@ -166,41 +178,21 @@ class MeasurementBlock(Block):
     drift: bool | None = None
     """If true, fit a linear drift of the instrument along. By default only with a coloured noise
     model; false where the instrument is known not to drift, and the sample may flow."""
-    noise_model: Annotated[str | None, OneOf(NOISE_MODELS)] = None
+    noise_model: Annotated[str | None, OneOf(("white", COLOURED))] = None
     """Model of the noise when a trace is judged. `white`: samples are independent; `coloured`:
     noise may be autocorrelated (AR(1), 1/f, a random walk) and grow with the rotation, and outliers
     are left out, so that intervals are wider and keep their coverage; every identification, judged
     or not, then fits an offset and a drift along, unless they are false. By default white."""
     noise: Noise
 
+    # No key.
+    by_options = False
+    """False if keys of the config say all; used in messages."""
+
     @property
     def coloured(self) -> bool:
         """True if the noise model is more than white noise."""
         return self.noise_model == COLOURED
-
-    @property
-    def columns(self) -> Columns:
-        """Columns of a recorded trace's file."""
-        (name,) = self.readings
-        axis = self.frequency if INSTRUMENTS[name].sweeps else self.time
-        assert axis is not None
-        partner = next((it for it in INSTRUMENTS[name].partners if getattr(self, it.name)), None)
-        same = (
-            *("start_s", "sd", "block", "average_repeated", "from_s", "until_s"),
-            *("rows", "load", "load_unit", "partner_unit", "loss_sd"),
-        )
-        return Columns(
-            axis,
-            getattr(self, name),
-            time_unit=self.time_unit or self.frequency_unit,
-            partner=partner,
-            partner_column=getattr(self, partner.name) if partner else "",
-            reading_unit=self.rotation_unit or self.reading_unit,
-            scale=1.0 if self.scale is None else self.scale,
-            quantity=self.instrument.read,
-            sphere_m=length_m(self.sphere or ""),
-            **{key: getattr(self, key) for key in same},
-        )
 
     @property
     def instrument(self) -> Instrument:
@@ -209,25 +201,49 @@ class MeasurementBlock(Block):
         return under_sphere(instrument, radius_m) if radius_m else instrument
 
     @property
+    def partner(self) -> Channel | None:
+        """What a sweep reads beside another modulus."""
+        return next((it for it in self.instrument.partners if getattr(self, it.name)), None)
+
+    @property
+    def axis(self) -> str:
+        """What readings follow: a key of `AXES`."""
+        return "frequency" if self.instrument.sweeps else "time"
+
+    @property
+    def named(self) -> dict[str, str]:
+        """Names of a file's columns by the key that says them, in the order of reading."""
+        partner = [self.partner.name] if self.partner else []
+        keys = (self.axis, self.readings[0], *partner, "sd", "loss_sd", "load")
+        return {key: name for key in keys if (name := getattr(self, key)) is not None}
+
+    @property
+    def axis_column(self) -> str:
+        """Name of the column of times, or of a sweep's frequencies."""
+        return self.named[self.axis]
+
+    @property
+    def reading_column(self) -> str:
+        """Name of that of what the instrument reads."""
+        return self.named[self.readings[0]]
+
+    def said_by(self, *keys: str) -> str:
+        """Return the options or config keys that say something, for messages."""
+        if self.by_options:
+            return " and ".join(map(_option, keys))
+        values = [f"{key}: {_BY_SET.get(key, 'UNIT')}".removesuffix(": UNIT") for key in keys]
+        return f"{' and '.join(values)} under measurement"
+
+    @property
     def readings(self) -> list[str]:
         """Quantities whose columns are named; of a valid recorded trace, one."""
         return [name for name in READINGS if getattr(self, name) is not None]
 
     @property
-    def undeclared(self) -> frozenset[str]:
-        """Which of offset and drift nothing is said of."""
+    def along(self) -> dict[str, bool]:
+        """True for offset and drift as far as they are fitted along."""
         said = {"offset": self.offset, "drift": self.drift}
-        return frozenset(name for name, declared in said.items() if declared is None)
-
-    @property
-    def fits_offset(self) -> bool:
-        """True if a constant offset is fitted along."""
-        return self.coloured if self.offset is None else self.offset
-
-    @property
-    def fits_drift(self) -> bool:
-        """True if a linear drift is fitted along."""
-        return self.coloured if self.drift is None else self.drift
+        return {name: self.coloured if it is None else it for name, it in said.items()}
 
     def complaints(self) -> Iterator[Complaint]:
         """Find keys that are in conflict, and what a recorded trace lacks."""
@@ -299,3 +315,21 @@ class MeasurementBlock(Block):
             unit = getattr(self, key)
             if unit is not None and known_unit(unit, of.units) is None:
                 yield (key,), f"found '{unit}', allowed are {', '.join(of.units)}."
+
+
+UNREAD = MeasurementBlock(rate_Hz=1.0, noise=Noise("gaussian", 0.0, "peak"))
+"""What a recording of no file was read by."""
+
+
+class ByOptions(MeasurementBlock):
+    """A measurement whose keys are set by options of the command, as messages then say."""
+
+    by_options = True
+
+
+def _option(key: str) -> str:
+    if key in _BY_SET:
+        return f"--set measurement.{key}={_BY_SET[key]}"
+    if key in PARTNERS:
+        return f"--reading {key}=COLUMN"
+    return "--reading" if key in INSTRUMENTS else f"--{key}"
