@@ -86,7 +86,7 @@ def test_what_is_shown_is_printed(tmp_path: Path) -> None:
     assert len(shown) > 3
     for commands, lines in shown:
         typed = [shlex.split(line, comments=True) for line in commands.splitlines()]
-        printed = [ran(tmp_path, *each, PYTHONPATH=str(ROOT / "src")).output for each in typed]
+        printed = [ran(tmp_path, *each, PYTHONPATH=str(ROOT / "src")) for each in typed]
         assert [line for line in lines.splitlines() if line not in "".join(printed)] == []
 
 

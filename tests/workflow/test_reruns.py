@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from biogrip.study.source import overlaid
-from tests.helpers.runs import TINY, clone, dry_run, planned, results_of, snakemake
+from tests.helpers.runs import TINY, clone, dry_run, jobs_of, planned, results_of, snakemake
 
 # Of the study: what puts all cases together.
 STUDY = {"figures": 1, "tables": 1, "evidence": 1, "claims": 1, "page": 1}
@@ -73,10 +73,10 @@ def test_a_dry_run_says_which_setting_changed_from_what_to_what(tiny: Path) -> N
     """Of the command line, from which a number in a block comes as text."""
     block = "evaluation={near_noise_tolerance: 0.03}"
     told = dry_run(tiny, "--config", block, config=TINY)
-    assert told.jobs == RECORDED | STUDY
+    assert jobs_of(told) == RECORDED | STUDY
     for when, value in (("before", 0.02), ("now", 0.03)):
         evaluation = f"'evaluation': {{'optimum_tolerance': 1.0, 'near_noise_tolerance': {value}}}"
-        assert re.search(rf"{when}: {{[^:]*{evaluation}", told.output)
+        assert re.search(rf"{when}: {{[^:]*{evaluation}", told)
 
 
 def test_an_edited_or_older_trace_in_the_place_of_another_is_read(tiny_copy: Path) -> None:
@@ -90,8 +90,8 @@ def test_an_edited_or_older_trace_in_the_place_of_another_is_read(tiny_copy: Pat
         trace.write_text("".join([first, *kept]))
         os.utime(trace, (1.5e9, 1.5e9))
         told = dry_run(tiny_copy, "--", "results/measurements/mine/seeds_0-0.npz", config=TINY)
-        assert told.jobs == jobs
-        said = re.search(r"before: \{'recorded': '\w+'\} now: \{'recorded': '\w+'\}", told.output)
+        assert jobs_of(told) == jobs
+        said = re.search(r"before: \{'recorded': '\w+'\} now: \{'recorded': '\w+'\}", told)
         assert bool(said) == bool(jobs)
 
 
@@ -103,8 +103,8 @@ def test_an_edit_of_the_library_runs_everything_again_and_is_named(
     with (tmp_path / "src" / "biogrip" / "arrays.py").open("a") as module:
         module.write("# An edit.\n")
     told = dry_run(tiny, config=TINY, snakefile=tmp_path / "Snakefile")
-    assert told.jobs["target"] == told.jobs["recording"] == 1
-    assert re.search(r"before: .*'source': '\w+'.* now: .*'source': '\w+'", told.output)
+    assert jobs_of(told)["target"] == jobs_of(told)["recording"] == 1
+    assert re.search(r"before: .*'source': '\w+'.* now: .*'source': '\w+'", told)
 
 
 @pytest.mark.nightly
