@@ -14,7 +14,7 @@ import pytest
 import yaml
 
 from tests.helpers.places import ROOT
-from tests.helpers.runs import SMALL, ran
+from tests.helpers.runs import SMALL, clone, ran
 
 SHOWN = re.compile(r"^```sh\n(biogrip identify data/[^`]*)```[^`]*^```text\n(.*?)^```", re.S | re.M)
 BLOCK = re.compile(r'^```(\w+)(?: title="([^"]+)")?\n(.*?)^```$', re.DOTALL | re.MULTILINE)
@@ -38,9 +38,9 @@ model_selection: {models: [damper, maxwell]}
 @pytest.fixture(scope="module")
 def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("reader")
-    for name in ("src", "workflow", "config", "profiles", "data"):
+    clone(folder)
+    for name in ("profiles", "data"):
         shutil.copytree(ROOT / name, folder / name)
-    shutil.copy(ROOT / "Snakefile", folder)
     # A long trace; few of its readings do.
     fish = folder / "data" / "measured" / "fish_muscle.csv"
     header, *rows = fish.read_text().splitlines()

@@ -8,8 +8,11 @@ import pytest
 from biogrip.study.source import overlaid
 from tests.helpers.runs import TINY, clone, dry_run, jobs_of, planned, results_of, snakemake
 
-# Of the study: what puts all cases together.
-STUDY = {"figures": 1, "tables": 1, "evidence": 1, "claims": 1, "page": 1}
+# Of the study: what puts all cases together, and what of it has more than simulated traces.
+TOLD = {"tables": 1, "claims": 1, "page": 1}
+STUDY = TOLD | {"figures": 1, "evidence": 1}
+# Of a simulated case, from its traces to their judgement, with one batch of them.
+TRACES = {"measurement": 1, "identification": 2, "model_fits": 1, "intervals": 1, "judgement": 1}
 # Of a simulated case and of a recorded trace.
 RECORDED = {"case_tables": 2, "case_figures": 1, "recorded_case_figures": 1}
 CELL = {"sample": {"model": "liquid_drop", "k": 20.0, "k_p": 5.0, "c": 80.0}}
@@ -18,26 +21,22 @@ LEVELS = {
     "rows": {"label": "level", "key": "measurement.noise.level", "values": [0.0, 0.2]},
     "columns": {"label": "rate", "key": "measurement.rate_Hz", "values": [1]},
 }
-# With one batch of a simulated case, and of a recorded trace.
 CHANGES: dict[str, tuple[dict[str, Any], dict[str, int]]] = {
     "nothing": ({}, {}),
     "noise": (
         {"measurement": {"noise": {"level": 0.2}}},
-        {"measurement": 1, "identification": 2, "model_fits": 1, "intervals": 1, "judgement": 1}
-        | {"recorded_judgement": 1, "mechanics": 1}
-        | RECORDED
-        | STUDY,
+        TRACES | {"recorded_judgement": 1, "mechanics": 1} | RECORDED | STUDY,
     ),
     "models to compare": (
         {"model_selection": {"models": ["maxwell"]}},
         {"model_fits": 2, "recorded_judgement": 1, "case_tables": 1, "recorded_case_figures": 1}
-        | {"tables": 1, "claims": 1, "page": 1},
+        | TOLD,
     ),
     "a case, and the title of another": (
         {"cases": {"new": CELL, "liquid_drop_2": {"title": "A drop"}}},
-        {"target": 1, "measurement": 1, "identification": 2, "model_fits": 1, "intervals": 1}
-        | {"judgement": 1, "mechanics": 1, "linearisation": 1, "case_tables": 2}
-        | {"case_figures": 1, "case_figures_without_valley": 1, "gripper_figures": 1}
+        {"target": 1, "mechanics": 1, "linearisation": 1, "case_tables": 2, "case_figures": 1}
+        | {"case_figures_without_valley": 1, "gripper_figures": 1}
+        | TRACES
         | STUDY,
     ),
     "seeds": (
@@ -50,7 +49,7 @@ CHANGES: dict[str, tuple[dict[str, Any], dict[str, int]]] = {
         {"cases": {"mine": {"measurement": {"until_s": 300.0}}}},
         {"recording": 1, "identification": 2, "model_fits": 1, "recorded_judgement": 1}
         | {"case_tables": 1, "recorded_case_figures": 1}
-        | {"tables": 1, "claims": 1, "page": 1},
+        | TOLD,
     ),
     # Whose points have no figures of their own.
     "budget of a method, and a sweep": (
