@@ -35,8 +35,8 @@ EXPORT = Path(__file__).parent / "traces/files/anton_paar_intervals.utf16.csv"
 
 
 def test_the_example_gives_its_truth() -> None:
-    """What is printed of it stands in the tutorial."""
-    _, found = example()
+    """What is printed of its quantities stands in README.md."""
+    said, found = example()
     quantities = by_quantity(found)
     truth = yaml.safe_load(EXAMPLE_TRUTH.read_text())["cases"]["example"]["sample"]
     truth["c + c_p"] = truth["c"] + truth["c_p"]
@@ -48,6 +48,9 @@ def test_the_example_gives_its_truth() -> None:
         # Five digits are written, or more where rounding to fewer would differ.
         assert item["value"] == pytest.approx(float(f"{item['value']:.5g}"), rel=1e-5)
     assert quantities["c_p"]["high"] > truth["c_p"]
+    # It is of a drop with a membrane; its parallel damper does not show.
+    assert "A simpler model, Maxwell liquid drop with membrane stiffness (--model liquid_" in said
+    assert said.count("97.5 %") == 1
     assert found["noise_rad"] == pytest.approx(0.05 * 6.7e-5, rel=0.3)
     assert found["notes"] == []
     assert "read_as" not in found

@@ -13,8 +13,7 @@ class Opened:
     def __init__(self, browser: Browser, page: Path, **context: Any) -> None:
         self.problems: list[str] = []
         self.asked: list[str] = []
-        self.context = browser.new_context(**context)
-        self.page = self.context.new_page()
+        self.page = browser.new_page(**context)
         self.page.on("pageerror", lambda error: self.problems.append(str(error)))
         self.page.on("console", self._said)
         self.page.on("request", self._requested)
@@ -22,7 +21,7 @@ class Opened:
 
     def close(self) -> None:
         assert (self.problems, self.asked) == ([], [])
-        self.context.close()
+        self.page.close()
 
     def _said(self, message: Any) -> None:
         if message.type == "error":

@@ -22,7 +22,6 @@ LEVELS = {
     "columns": {"label": "rate", "key": "measurement.rate_Hz", "values": [1]},
 }
 CHANGES: dict[str, tuple[dict[str, Any], dict[str, int]]] = {
-    "nothing": ({}, {}),
     "noise": (
         {"measurement": {"noise": {"level": 0.2}}},
         TRACES | {"recorded_judgement": 1, "mechanics": 1} | RECORDED | STUDY,
