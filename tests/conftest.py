@@ -29,12 +29,6 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--pin", action="store_true", help="draw the pinned pictures of figures anew")
 
 
-@pytest.fixture(scope="session")
-def pinning(request: pytest.FixtureRequest) -> bool:
-    """Whether pinned pictures are drawn anew instead of compared."""
-    return bool(request.config.getoption("--pin"))
-
-
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Begin with the test that mostly waits, for Slurm, and with the study that many need.
 
@@ -120,3 +114,9 @@ def tiny(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Path:
             snakemake(building, config=TINY)
             building.rename(folder)
     return folder
+
+
+@pytest.fixture
+def tiny_copy(tiny: Path, tmp_path: Path) -> Path:
+    """The tiny study to be changed, file times kept."""
+    return shutil.copytree(tiny, tmp_path / "study")

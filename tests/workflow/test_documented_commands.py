@@ -102,10 +102,8 @@ def test_what_the_readme_types_runs(place: Path) -> None:
 def _typed(command: list[str]) -> list[str]:
     program, *arguments = command
     if program == "snakemake" and "--snakefile" not in arguments:
-        files = (
-            arguments[arguments.index("--configfile") + 1 :] if "--configfile" in arguments else []
-        )
-        rest = arguments[: len(arguments) - len(files) - 1] if files else arguments
+        cut = arguments.index("--configfile") if "--configfile" in arguments else len(arguments)
+        rest, files = arguments[:cut], arguments[cut + 1 :]
         looked_at = [target for file in files for target in LOOKED_AT.get(file, [])]
         return [program, "--configfile", "tiny.yaml", *files, *rest, *looked_at]
     if arguments[:1] == ["identify"] and "--config" not in arguments:
