@@ -28,10 +28,8 @@ from biogrip.physics.models import CANDIDATES
 from biogrip.study.source import HOLD
 from tests.generated_docs import example
 from tests.helpers.identified import FEW, by_quantity, identified, identify, told, write_drop
-from tests.helpers.places import EXAMPLE, EXAMPLE_TRUTH
+from tests.helpers.places import EXAMPLE, EXAMPLE_TRUTH, ROOT
 from tests.helpers.problems import clean
-
-EXPORT = Path(__file__).parent / "traces/files/anton_paar_intervals.utf16.csv"
 
 
 def test_the_example_gives_its_truth() -> None:
@@ -114,11 +112,11 @@ def test_options_are_keys_of_the_config_and_the_last_one_counts(tmp_path: Path) 
 
 
 def test_what_is_recognised_in_an_export_is_said(tmp_path: Path, few: Path) -> None:
-    trace = Path(shutil.copy(EXPORT, tmp_path / "gel.csv"))
+    export = ROOT / "tests" / "traces" / "files" / "anton_paar_intervals.utf16.csv"
+    trace = Path(shutil.copy(export, tmp_path / "gel.csv"))
     options = "--time Time --start 24 --model maxwell --set measurement.block=3 --no-compare"
-    reading = "--reading", "modulus=Relaxation Modulus"
-    given: list[str | Path] = ["--config", few, *options.split(), *reading]
-    status, _, said = identify(trace, *given)
+    reading = ("--reading", "modulus=Relaxation Modulus")
+    status, _, said = identify(trace, "--config", few, *options.split(), *reading)
     assert status == 0
     assert "gel.csv is read as\n  encoding     UTF-16\n  separator    tabs\n" in said
     assert "\n  modulus      Relaxation Modulus, in kPa\n" in said

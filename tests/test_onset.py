@@ -20,7 +20,6 @@ PHASES = (hold(20.0, 1e-9), hold(20.0, 0.4e-9), hold(20.0, 1.2e-9))
 TRUTH = {"k": 29.0, "k_p": 6.0, "c": 100.0, "c_p": 20.0}
 EXPERIMENT = set_up(STUDY.gripper, PHASES, Sample("generalized_maxwell"))
 NOISE_RAD, ONSET_S = 3e-7, 8.07
-PROTOCOL = {"phases": [{"duration_s": 20, "torque_Nm": each.level} for each in PHASES]}
 
 
 def late(seed: int, onset_s: float = ONSET_S, *, flat: bool = False) -> tuple[Array, Array]:
@@ -34,7 +33,8 @@ def late(seed: int, onset_s: float = ONSET_S, *, flat: bool = False) -> tuple[Ar
 
 
 def gripped(times: Array, values: Array, **given: Any) -> TraceResult:
-    return told(times, values, config={"protocol": PROTOCOL}, **given)
+    phases = [{"duration_s": 20, "torque_Nm": each.level} for each in PHASES]
+    return told(times, values, config={"protocol": {"phases": phases}}, **given)
 
 
 @pytest.mark.parametrize("phases", [PHASES, (ramp(30.0, 0.0, 1e-9), hold(30.0, 0.3e-9))])
