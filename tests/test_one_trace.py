@@ -138,6 +138,9 @@ def test_what_was_held_is_stated_once(tmp_path: Path) -> None:
             case_of(Asked(EXAMPLE, config, settings, "t.tsv, line 2"))
         said = f"t.tsv, line 2: found --hold and {beside}; allowed is one of them."
         assert str(error.value) == said
+    strain = Setting("t.tsv", ("measurement", "strain"), "rotation_rad")
+    with pytest.raises(BiogripError, match=r"^t\.tsv, line 2: --hold: is missing; allowed is the"):
+        case_of(Asked(EXAMPLE, None, (strain,), "t.tsv, line 2"))
 
 
 @pytest.mark.parametrize("floor", [0.1, 0.0])
