@@ -147,9 +147,6 @@ def planned(folder: Path, *targets: str, config: dict[str, Any]) -> dict[str, in
 
 def results_of(folder: Path) -> dict[str, bytes]:
     results = folder / "results"
-    files = {file.relative_to(results): file for file in sorted(results.rglob("*.*"))}
-    return {
-        str(name): file.read_bytes()
-        for name, file in files.items()
-        if file.is_file() and name.parts[0] not in ("logs", "benchmarks")
-    }
+    left_out = {results / "logs", results / "benchmarks"}
+    files = [it for it in results.rglob("*.*") if it.is_file() and not left_out & {*it.parents}]
+    return {str(file.relative_to(results)): file.read_bytes() for file in files}
