@@ -1,5 +1,7 @@
+import fcntl
 import gc
 import os
+import shutil
 
 # Workers share the cores; BLAS reads this once, while numpy is imported.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -11,24 +13,20 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser
+from playwright.sync_api import Browser, sync_playwright
 
 from biogrip.physics.gripper import Arm, Gripper
-from biogrip.physics.protocol import Course, Phase, hold, join_phases
-from tests.helpers.browser import Opened, chromium, executable
+from biogrip.physics.protocol import Course, join_phases
+from tests.helpers.browser import Opened
+from tests.helpers.default import STUDY
 from tests.helpers.identified import FEW
+from tests.helpers.places import EXAMPLE
 from tests.helpers.required import cannot_run
-from tests.helpers.runs import built_once, run_tiny
+from tests.helpers.runs import TINY, snakemake
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--pin", action="store_true", help="draw the pinned pictures of figures anew")
-
-
-@pytest.fixture(scope="session")
-def pinning(request: pytest.FixtureRequest) -> bool:
-    """Whether pinned pictures are drawn anew instead of compared."""
-    return bool(request.config.getoption("--pin"))
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -54,10 +52,15 @@ def pytest_collection_finish() -> None:
 
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Browser]:
-    if executable() is None:
+    """Debian's Chromium, driven by Playwright."""
+    executable = shutil.which("chromium") or shutil.which("chromium-browser")
+    if executable is None:
         cannot_run("BIOGRIP_REQUIRE_CHROMIUM", "Chromium is missing: apt-get install chromium")
-    with chromium() as started:
+    with sync_playwright() as driver:
+        # A sandbox of its own is not to be had in every container; the pages are ours.
+        started = driver.chromium.launch(executable_path=executable, args=["--no-sandbox"])
         yield started
+        started.close()
 
 
 @pytest.fixture
@@ -76,9 +79,7 @@ def visit(browser: Browser) -> Iterator[Callable[..., Opened]]:
 
 @pytest.fixture(scope="session")
 def gripper() -> Gripper:
-    """The default study's gripper."""
-    arm = Arm(1.0e-14, 3.3e-12, 4.4e-7)
-    return Gripper(1.5e-3, 75.0, arm, arm)
+    return STUDY.gripper
 
 
 @pytest.fixture(scope="session")
@@ -87,14 +88,9 @@ def unequal_gripper() -> Gripper:
 
 
 @pytest.fixture(scope="session")
-def phases() -> tuple[Phase, ...]:
+def steps() -> Course:
     """The paper's protocol, Figure 3."""
-    return (hold(200.0, 1.6e-9), hold(200.0, 0.32e-9))
-
-
-@pytest.fixture(scope="session")
-def steps(phases: tuple[Phase, ...]) -> Course:
-    return join_phases(phases)
+    return join_phases(STUDY.phases)
 
 
 @pytest.fixture(scope="session")
@@ -107,4 +103,20 @@ def few(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def tiny(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Path:
     """Folder of a small study that Snakemake has run, one for all workers: leave it as it is."""
-    return built_once("tiny", run_tiny, tmp_path_factory, worker_id)
+    own = tmp_path_factory.getbasetemp()
+    folder = (own if worker_id == "master" else own.parent) / "tiny"
+    with folder.with_suffix(".lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not folder.exists():
+            building = tmp_path_factory.mktemp("building")
+            header, *rows = EXAMPLE.read_text().splitlines(keepends=True)
+            (building / "mine.csv").write_text("".join([header, *rows[::8]]))
+            snakemake(building, config=TINY)
+            building.rename(folder)
+    return folder
+
+
+@pytest.fixture
+def tiny_copy(tiny: Path, tmp_path: Path) -> Path:
+    """The tiny study to be changed, file times kept."""
+    return shutil.copytree(tiny, tmp_path / "study")

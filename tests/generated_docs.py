@@ -4,7 +4,7 @@ import ast
 import json
 import re
 import textwrap
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable
 from contextlib import redirect_stderr, redirect_stdout, suppress
 from functools import cache
 from io import StringIO
@@ -66,7 +66,7 @@ _SLOW = 1000
 
 def paper_against_study() -> str:
     beside = read_table(_path("tables_5_to_7", "readings"))
-    return _table(iter(answers.rows_beside_the_paper(beside, _CASES)))
+    return _table(answers.rows_beside_the_paper(beside, _CASES))
 
 
 def readings_compared() -> str:
@@ -113,7 +113,7 @@ def choices() -> str:
         for heading, (quantity, case) in errors.items():
             row[heading] = f"{own.loc[case, f'error_percent {quantity}']:.2g} %"
         rows.append(row)
-    return _table(iter(rows))
+    return _table(rows)
 
 
 def protocols_compared() -> str:
@@ -177,7 +177,7 @@ def measured() -> str:
             row = {"sample": sample.replace("_", " ") * first, "fit": own["fit"] * first}
             row |= {"quantity": with_unit(quantity, own["unit"]), "published": f"{value:.5g}"}
             rows.append(row | {"ours, 95 % limits": _limits_of(own), "lowest BIC": best * first})
-    return _table(iter(rows))
+    return _table(rows)
 
 
 def _limits_of(row: dict[str, str]) -> str:
@@ -201,7 +201,7 @@ def errors_by_noise() -> str:
             row[f"{level} % noise"] = f"{_range(error, '.2g', ' %')} ({_range(bound, '.2g', ' %')})"
         near = 100 * ours[ours["row"] == 2]["near_noise_genetic"]
         rows.append(row | {"runs near a noise of 2 %": _range(near, ".0f", " %")})
-    return _table(iter(rows))
+    return _table(rows)
 
 
 def methods_compared() -> str:
@@ -220,7 +220,7 @@ def methods_compared() -> str:
     least = table.groupby("case", sort=False)["encodable_rise"].first()
     shown = [in_digits(rise, 2) for rise in least]
     best = dict(zip(rows[0], ["*best encodable point*", *shown, ""], strict=True))
-    return _table(iter([*rows, best]))
+    return _table([*rows, best])
 
 
 def slow_branch() -> str:
@@ -314,14 +314,14 @@ def _help(*command: str) -> str:
     return said.getvalue()
 
 
-def _table(rows: Iterator[dict[str, str]]) -> str:
+def _table(rows: Iterable[dict[str, str]]) -> str:
     return str(pd.DataFrame(rows).to_markdown(index=False, disable_numparse=True))
 
 
 _COVERAGE = _path("coverage", "coverage")
 _SHORTER = "--no-compare", "--set", "gripper.arm_length_m=1.2e-3"
 PARTS: dict[str, dict[str, Callable[[], str]]] = {
-    "docs/reference/config.md": {"keys": lambda: reference(ROOT / "config" / "config.yaml")},
+    "docs/reference/config.md": {"keys": reference},
     "README.md": {"answer": answer, "example": identified_example},
     "CONTRIBUTING.md": {"folders": folders},
     "docs/tutorial.md": {"printed": printed_example, "shorter": lambda: _quantities(*_SHORTER)},

@@ -54,11 +54,10 @@ def test_a_rejected_fit_says_only_why() -> None:
     assert {item["verdict"] for item in found.data["quantities"]} == {"fit rejected"}
     assert all(item["low"] is item["high"] is None for item in found.data["quantities"])
     assert found.data["trades"] == []
-    notes = found.data["notes"]
-    heavy = [note["text"] for note in notes if note["weight"] == REJECTION]
-    light = [note["text"] for note in notes if note["weight"] != REJECTION]
-    assert heavy == found.data["reasons"]
-    assert light == ["Left out for want of a number: 1 row of 800."]
+    *heavy, light = found.data["notes"]
+    assert [note["text"] for note in heavy] == found.data["reasons"]
+    assert {note["weight"] for note in heavy} == {REJECTION}
+    assert light == {"weight": HARMLESS, "text": "Left out for want of a number: 1 row of 800."}
     assert found.data["noise_rad"] is None
     for word in ("allow for", "richer", "suits the trace", "intervals", "Limits are"):
         assert word not in str(found)

@@ -58,11 +58,11 @@ def test_a_folder_is_new_and_whole(tmp_path: Path, capsys: pytest.CaptureFixture
 
 def test_traces_of_one_name_are_cases_of_their_own(tmp_path: Path) -> None:
     times = np.arange(1.0, 40.0)
-    for name in ("a", "b"):
-        (tmp_path / name).mkdir()
-        strain = 0.01 + 0.001 * times + 1e-5 * (times % 3)
-        write_trace(tmp_path / name / "gel.csv", times, strain, header="time_s,strain")
+    strain = 0.01 + 0.001 * times + 1e-5 * (times % 3)
     traces = [str(tmp_path / name / "gel.csv") for name in ("a", "b")]
+    for trace in map(Path, traces):
+        trace.parent.mkdir()
+        write_trace(trace, times, strain, header="time_s,strain")
     options = ["--reading", "strain", "--hold", "5", "--model", "zener_kelvin"]
     assert main(["study", *traces, *options, "--output", str(tmp_path / "own")]) == 0
     study = yaml.safe_load((tmp_path / "own" / "study.yaml").read_text())

@@ -11,7 +11,7 @@ import pytest
 from biogrip.command import files as command
 from biogrip.command.options import Setting
 from biogrip.command.outputs import read_result, write_result
-from biogrip.command.settings import Asked, case_of, is_table, read_table
+from biogrip.command.settings import Asked, is_table, read_table
 from biogrip.errors import BiogripError
 from biogrip.library import Sample, hold, set_up, simulate
 from tests.helpers.default import STUDY
@@ -63,15 +63,6 @@ def refused(path: Path) -> list[str]:
     with pytest.raises(BiogripError) as error:
         read_table(path)
     return str(error.value).splitlines()
-
-
-def test_a_row_says_what_options_and_config_say_of_one_trace(here: Path) -> None:
-    _, other = read_table(here / "cells.tsv")
-    lab = f"protocol: {{phases: {PHASES}}}\ngripper: {{arm_length_m: 3e-3}}\n"
-    (here / "lab.yaml").write_text(lab)
-    time = Setting("--time", ("measurement", "time"), "t_s")
-    asked = Asked(other.trace, here / "lab.yaml", (time,))
-    assert case_of(other)[0].block == case_of(asked)[0].block
 
 
 def test_a_trace_may_stand_beside_a_table_that_does_not_name_it(here: Path) -> None:
@@ -129,16 +120,17 @@ def test_traces_side_by_side_are_a_row_each(here: Path) -> None:
 
 def test_all_that_is_wrong_with_a_table_is_said_at_once(tmp_path: Path) -> None:
     path = tmp_path / "cells.tsv"
-    rows = "a.csv|||||1:30", "./a.csv|||||[1", "a.csv|||||[1"
-    write(path, "file|dish|dish|fit|k value|measurement.skip", *rows)
+    rows = "a.csv|||||1:30|soon", "./a.csv|||||[1", "a.csv|||||[1"
+    write(path, "file|dish|dish|fit|k value|measurement.skip|hold", *rows)
     lines = [line.removeprefix(f"{path}, line ") for line in refused(path)]
-    below = [lines.pop(4).split(":")[:2] for _ in range(2)]
+    below = [lines.pop(5).split(":")[:2] for _ in range(2)]
     assert lines == [
         "1, column 'dish': stands twice; allowed is each name once.",
         "1, column 'fit': is a column of the results; allowed is another name.",
         "1, column 'k value': is a column of the results; allowed is another name.",
         "2, column 'measurement.skip': found 1:30, which YAML reads in base 60; allowed is a "
         "number without colons, or text in quotes.",
+        "2, column 'hold': found 'soon', allowed is a number, or one with its unit",
         f"4, column 'file': found '{tmp_path}/a.csv' again, as on line 3; allowed is each trace "
         "once, or a column 'reading' that tells which, as in strain=COLUMN.",
     ]
@@ -176,16 +168,6 @@ def test_settings_that_cannot_be_used_are_said_at_once(here: Path) -> None:
     lines = [line.partition("cells.tsv, ")[2] for line in error.splitlines()]
     assert [line[: len(own)] for line, own in zip(lines, said, strict=True)] == said
     assert not list(here.glob("*.json"))
-
-
-def test_what_was_held_is_refused_with_its_place(here: Path) -> None:
-    for held, said in (
-        ("soon", "line 2, column 'hold': found 'soon', allowed is a number"),
-        ("5 soon", "line 2, column 'hold': found the unit 'soon' of a stress, allowed are Pa"),
-        ("", "line 2: --hold: is missing; allowed is the stress in Pa"),
-    ):
-        write(here / "cells.tsv", "file|hold", f"usual.csv|{held}")
-        assert said in identify("cells.tsv", "--reading", "strain=rotation_rad")[2]
 
 
 def test_traces_of_a_command_read_one_quantity(here: Path) -> None:

@@ -25,7 +25,7 @@ def test_the_wheel_identifies_a_trace_and_runs_a_study(tmp_path: Path) -> None:
     path = os.pathsep.join([f"{there}/bin", str(Path(sys.executable).parent), os.environ["PATH"]])
 
     def said(*command: str | Path) -> str:
-        return ran(place, *command, PATH=path, PYTHONPATH=str(there)).output
+        return ran(place, *command, PATH=path, PYTHONPATH=str(there))
 
     pip = (sys.executable, "-m", "pip", "--disable-pip-version-check")
     options = ("--quiet", "--no-deps", "--no-index", "--no-build-isolation")

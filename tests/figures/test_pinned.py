@@ -80,8 +80,9 @@ def difference(name: str, found: Image.Image) -> float:
     return float(np.sqrt(np.mean((before - now) ** 2)))
 
 
-def test_no_figure_changed(tiny: Path, tmp_path: Path, pinning: bool) -> None:
+def test_no_figure_changed(tiny: Path, tmp_path: Path, request: pytest.FixtureRequest) -> None:
     """Of a recorded trace, `mine`, are only figures that a simulated one has, too."""
+    pinning = request.config.getoption("--pin")
     if not pinning and VERSION_FILE.read_text().strip() != VERSION:
         pytest.skip(f"pictures are pinned with Matplotlib {VERSION_FILE.read_text().strip()}")
     with styled():

@@ -1,36 +1,19 @@
-"""Debian's Chromium, driven by Playwright."""
+"""Pages in a browser, see `tests.conftest`."""
 
-import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import Browser, sync_playwright
-
-
-def executable() -> str | None:
-    return shutil.which("chromium") or shutil.which("chromium-browser")
-
-
-@contextmanager
-def chromium() -> Iterator[Browser]:
-    with sync_playwright() as driver:
-        # A sandbox of its own is not to be had in every container; the pages are ours.
-        browser = driver.chromium.launch(executable_path=executable(), args=["--no-sandbox"])
-        yield browser
-        browser.close()
+from playwright.sync_api import Browser
 
 
 class Opened:
     """A page, what went wrong in it, and what it asked for beside itself."""
 
-    def __init__(self, browser: Any, page: Path, **context: Any) -> None:
+    def __init__(self, browser: Browser, page: Path, **context: Any) -> None:
         self.problems: list[str] = []
         self.asked: list[str] = []
-        self.context = browser.new_context(**context)
-        self.page = self.context.new_page()
+        self.page = browser.new_page(**context)
         self.page.on("pageerror", lambda error: self.problems.append(str(error)))
         self.page.on("console", self._said)
         self.page.on("request", self._requested)
@@ -38,7 +21,7 @@ class Opened:
 
     def close(self) -> None:
         assert (self.problems, self.asked) == ([], [])
-        self.context.close()
+        self.page.close()
 
     def _said(self, message: Any) -> None:
         if message.type == "error":

@@ -3,7 +3,6 @@
 import json
 from collections.abc import Mapping
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import pandas as pd
@@ -14,6 +13,7 @@ from biogrip.keys import Block
 from biogrip.study.case_blocks import OVERRIDABLE
 from biogrip.study.config import StudyConfig
 from biogrip.study.messages import Schema, bound, tidy
+from tests.helpers.places import CONFIG
 
 _MOST_LISTED = 6
 _SIGNS = {"exclusiveMinimum": ">", "minimum": "≥", "maximum": "≤"}
@@ -38,12 +38,12 @@ def leaves(block: Schema, path: str = "") -> dict[str, Schema]:
     return found
 
 
-def reference(config: Path) -> str:
-    """Return Markdown tables of all keys: meaning, unit, default in a file, allowed values.
+def reference() -> str:
+    """Return Markdown tables of all keys: meaning, unit, default, allowed values.
 
-    Where a file gives no default it is that of the class.
+    Where the default config gives no default it is that of the class.
     """
-    defaults = yaml.safe_load(config.read_text(encoding="utf-8"))
+    defaults = yaml.safe_load(CONFIG.read_text(encoding="utf-8"))
     sections: dict[str, list[tuple[str, ...]]] = {"General": []}
     for path, schema in leaves(STUDY).items():
         top, *inner = path.split(".")

@@ -1,22 +1,18 @@
 """Small studies that Snakemake runs, each in a folder of its own, and what it would run."""
 
-import fcntl
 import multiprocessing
 import os
 import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 from typing import Any
 
-import pytest
 import yaml
 
-from tests.helpers.places import EXAMPLE, ROOT
+from tests.helpers.places import ROOT
 
 _SECONDS = 1200
 _JOBS = re.compile(r"^(\w+) +(\d+) *$", re.MULTILINE)
@@ -46,17 +42,10 @@ ONE_CASE = SMALL | {"methods": ["genetic"], "only": ["liquid_drop_2"]}
 ONE_CASE |= {"identifiability": {"coverage_seeds": 0}, "model_selection": {"models": []}}
 
 
-@dataclass(frozen=True)
-class Run:
-    """What a call of Snakemake said."""
-
-    output: str
-
-    @property
-    def jobs(self) -> dict[str, int]:
-        """Number of jobs of each rule, from the last table of jobs of a dry run."""
-        found = {rule: int(jobs) for rule, jobs in _JOBS.findall(self.output)}
-        return {rule: jobs for rule, jobs in found.items() if rule not in ("all", "study", "total")}
+def jobs_of(dry_run: str) -> dict[str, int]:
+    """Number of jobs of each rule, from the last table of jobs of what a dry run says."""
+    found = {rule: int(jobs) for rule, jobs in _JOBS.findall(dry_run)}
+    return {rule: jobs for rule, jobs in found.items() if rule not in ("all", "study", "total")}
 
 
 def _environment() -> dict[str, str]:
@@ -64,8 +53,8 @@ def _environment() -> dict[str, str]:
     return {**os.environ, "PATH": path}
 
 
-def ran(folder: Path, *command: str | Path, status: int = 0, **environment: str) -> Run:
-    """Run a command that ends with a status, with the commands of this Python in its path."""
+def ran(folder: Path, *command: str | Path, status: int = 0, **environment: str) -> str:
+    """What a command says that ends with a status, with the commands of this Python in its path."""
     done = subprocess.run(
         [*map(str, command)],
         cwd=folder,
@@ -76,7 +65,7 @@ def ran(folder: Path, *command: str | Path, status: int = 0, **environment: str)
         timeout=_SECONDS,
     )
     assert done.returncode == status, done.stdout
-    return Run(done.stdout)
+    return done.stdout
 
 
 # Processes for Snakemake come from one that has loaded it: of 4 s of a dry run that is 3.
@@ -87,7 +76,7 @@ _LOADED.set_forkserver_preload(_USED.split())
 _PYTHONPATH = os.environ.get("PYTHONPATH")
 
 
-def called(folder: Path, *arguments: str | Path, status: int = 0) -> Run:
+def called(folder: Path, *arguments: str | Path, status: int = 0) -> str:
     if os.environ.get("PYTHONPATH") != _PYTHONPATH:
         # With other code than what is loaded.
         return ran(folder, sys.executable, "-m", "snakemake", *arguments, status=status)
@@ -101,7 +90,7 @@ def called(folder: Path, *arguments: str | Path, status: int = 0) -> Run:
             raise TimeoutError(said.read())
         output = said.read()
         assert process.exitcode == status, output
-        return Run(output)
+        return output
 
 
 def _snakemake(
@@ -130,7 +119,7 @@ def snakemake(
     config: dict[str, Any] | None = None,
     snakefile: Path = ROOT / "Snakefile",
     status: int = 0,
-) -> Run:
+) -> str:
     """Run the workflow in a folder, over a config laid on the default study, as `overlay.yaml`."""
     given: list[str | Path] = ["-s", snakefile, "--directory", folder]
     if config is not None:
@@ -143,7 +132,7 @@ def snakemake(
 
 def dry_run(
     folder: Path, *arguments: str, config: dict[str, Any], snakefile: Path = ROOT / "Snakefile"
-) -> Run:
+) -> str:
     # Other workers ask in the same folder.
     with NamedTemporaryFile("w", suffix=".yaml") as overlay:
         yaml.safe_dump(config, overlay)
@@ -153,39 +142,11 @@ def dry_run(
 
 
 def planned(folder: Path, *targets: str, config: dict[str, Any]) -> dict[str, int]:
-    return dry_run(folder, "--quiet", "rules", "--", *targets, config=config).jobs
+    return jobs_of(dry_run(folder, "--quiet", "rules", "--", *targets, config=config))
 
 
 def results_of(folder: Path) -> dict[str, bytes]:
     results = folder / "results"
-    files = {file.relative_to(results): file for file in sorted(results.rglob("*.*"))}
-    return {
-        str(name): file.read_bytes()
-        for name, file in files.items()
-        if file.is_file() and name.parts[0] not in ("logs", "benchmarks")
-    }
-
-
-def run_tiny(folder: Path) -> None:
-    """Run the tiny study, from its config and the user's trace to its page."""
-    header, *rows = EXAMPLE.read_text().splitlines(keepends=True)
-    (folder / "mine.csv").write_text("".join([header, *rows[::8]]))
-    snakemake(folder, config=TINY)
-
-
-def built_once(
-    name: str,
-    build: Callable[[Path], None],
-    tmp_path_factory: pytest.TempPathFactory,
-    worker_id: str,
-) -> Path:
-    """Build a folder unless another worker has."""
-    own = tmp_path_factory.getbasetemp()
-    folder = (own if worker_id == "master" else own.parent) / name
-    with folder.with_suffix(".lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        if not folder.exists():
-            building = tmp_path_factory.mktemp("building")
-            build(building)
-            building.rename(folder)
-    return folder
+    left_out = {results / "logs", results / "benchmarks"}
+    files = [it for it in results.rglob("*.*") if it.is_file() and not left_out & {*it.parents}]
+    return {str(file.relative_to(results)): file.read_bytes() for file in files}

@@ -14,7 +14,7 @@ import pytest
 import yaml
 
 from tests.helpers.places import ROOT
-from tests.helpers.runs import SMALL, ran
+from tests.helpers.runs import SMALL, clone, ran
 
 SHOWN = re.compile(r"^```sh\n(biogrip identify data/[^`]*)```[^`]*^```text\n(.*?)^```", re.S | re.M)
 BLOCK = re.compile(r'^```(\w+)(?: title="([^"]+)")?\n(.*?)^```$', re.DOTALL | re.MULTILINE)
@@ -38,9 +38,9 @@ model_selection: {models: [damper, maxwell]}
 @pytest.fixture(scope="module")
 def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("reader")
-    for name in ("src", "workflow", "config", "profiles", "data"):
+    clone(folder)
+    for name in ("profiles", "data"):
         shutil.copytree(ROOT / name, folder / name)
-    shutil.copy(ROOT / "Snakefile", folder)
     # A long trace; few of its readings do.
     fish = folder / "data" / "measured" / "fish_muscle.csv"
     header, *rows = fish.read_text().splitlines()
@@ -86,7 +86,7 @@ def test_what_is_shown_is_printed(tmp_path: Path) -> None:
     assert len(shown) > 3
     for commands, lines in shown:
         typed = [shlex.split(line, comments=True) for line in commands.splitlines()]
-        printed = [ran(tmp_path, *each, PYTHONPATH=str(ROOT / "src")).output for each in typed]
+        printed = [ran(tmp_path, *each, PYTHONPATH=str(ROOT / "src")) for each in typed]
         assert [line for line in lines.splitlines() if line not in "".join(printed)] == []
 
 
@@ -102,10 +102,8 @@ def test_what_the_readme_types_runs(place: Path) -> None:
 def _typed(command: list[str]) -> list[str]:
     program, *arguments = command
     if program == "snakemake" and "--snakefile" not in arguments:
-        files = (
-            arguments[arguments.index("--configfile") + 1 :] if "--configfile" in arguments else []
-        )
-        rest = arguments[: len(arguments) - len(files) - 1] if files else arguments
+        cut = arguments.index("--configfile") if "--configfile" in arguments else len(arguments)
+        rest, files = arguments[:cut], arguments[cut + 1 :]
         looked_at = [target for file in files for target in LOOKED_AT.get(file, [])]
         return [program, "--configfile", "tiny.yaml", *files, *rest, *looked_at]
     if arguments[:1] == ["identify"] and "--config" not in arguments:

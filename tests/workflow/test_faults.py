@@ -42,7 +42,7 @@ def test_after_a_kill_the_same_command_ends_with_the_undisturbed_bytes(
     assert process.wait() != 0
     if how == signal.SIGKILL:
         again = snakemake(tiny_copy, "--", ERRORS, config=TINY, status=1)
-        assert "--unlock" in again.output
+        assert "--unlock" in again
         snakemake(tiny_copy, "--unlock", config=TINY)
     snakemake(tiny_copy, "--", ERRORS, "results/tables/methods.csv", config=TINY)
     ours, theirs = results_of(tiny_copy), results_of(tiny)
@@ -56,7 +56,7 @@ def test_what_is_missing_or_locked_is_said_and_made_again(tiny: Path, tiny_copy:
     lock.parent.mkdir(parents=True, exist_ok=True)
     lock.write_text(f"{ERRORS}\n")
     refused = snakemake(tiny_copy, "--", ERRORS, config=TINY, status=1)
-    assert "Directory cannot be locked" in refused.output
+    assert "Directory cannot be locked" in refused
     shutil.rmtree(tiny_copy / ".snakemake")
     snakemake(tiny_copy, "--", ERRORS, config=TINY)
     assert (tiny_copy / ERRORS).read_bytes() == (tiny / ERRORS).read_bytes()
@@ -71,5 +71,5 @@ def test_a_full_disk_leaves_no_part_of_a_file(tmp_path: Path) -> None:
         "write_text(Path('table.csv'), 'a' * 5000)"
     )
     run = ran(tmp_path, sys.executable, "-c", code, status=1)
-    assert "table.csv: cannot be written: File too large." in run.output
+    assert "table.csv: cannot be written: File too large." in run
     assert list(tmp_path.iterdir()) == []

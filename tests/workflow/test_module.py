@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from tests.helpers.places import ROOT
-from tests.helpers.runs import ONE_CASE, Run, called, ran
+from tests.helpers.runs import ONE_CASE, called, ran
 
 CONFIG = ONE_CASE | {"seeds": 1}
 ERRORS = "results/tables/errors_liquid_drop_2.csv"
@@ -17,7 +17,7 @@ module biogrip:
 """
 
 
-def host(folder: Path, text: str, *arguments: str) -> Run:
+def host(folder: Path, text: str, *arguments: str) -> str:
     (folder / "Snakefile").write_text(text)
     return called(folder, "-j2", "--workflow-profile", "none", *arguments)
 
@@ -46,7 +46,7 @@ rule mine:
     shell: "command -v python > {{output}}"
 """
     run = host(tmp_path, text, "--", "elsewhere/liquid_drop_2/seeds_0-0.npz", "mine.txt")
-    assert "Measuring with 4321 MB" in run.output
+    assert "Measuring with 4321 MB" in run
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         *(".snakemake", "Snakefile", "elsewhere", "host.yaml", "mine.txt", "sub")
     ]
@@ -63,7 +63,7 @@ def test_it_is_deployed_from_a_clone_and_runs_a_case(
     pytest.importorskip("snakedeploy")
     clone, place = tmp_path / "clone", tmp_path / "place"
     ran(tmp_path, "git", "clone", "-q", ROOT, clone)
-    branch = ran(clone, "git", "branch", "--show-current").output.strip()
+    branch = ran(clone, "git", "branch", "--show-current").strip()
     ran(tmp_path, "snakedeploy", "deploy-workflow", clone, place, "--branch", branch)
     (place / "config" / "config.yaml").write_text(yaml.safe_dump(CONFIG))
     # Of a clone it names the Snakefile without the folder; of a server it names the server, too.

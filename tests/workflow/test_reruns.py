@@ -6,10 +6,13 @@ from typing import Any
 import pytest
 
 from biogrip.study.source import overlaid
-from tests.helpers.runs import TINY, clone, dry_run, planned, results_of, snakemake
+from tests.helpers.runs import TINY, clone, dry_run, jobs_of, planned, results_of, snakemake
 
-# Of the study: what puts all cases together.
-STUDY = {"figures": 1, "tables": 1, "evidence": 1, "claims": 1, "page": 1}
+# Of the study: what puts all cases together, and what of it has more than simulated traces.
+TOLD = {"tables": 1, "claims": 1, "page": 1}
+STUDY = TOLD | {"figures": 1, "evidence": 1}
+# Of a simulated case, from its traces to their judgement, with one batch of them.
+TRACES = {"measurement": 1, "identification": 2, "model_fits": 1, "intervals": 1, "judgement": 1}
 # Of a simulated case and of a recorded trace.
 RECORDED = {"case_tables": 2, "case_figures": 1, "recorded_case_figures": 1}
 CELL = {"sample": {"model": "liquid_drop", "k": 20.0, "k_p": 5.0, "c": 80.0}}
@@ -18,26 +21,21 @@ LEVELS = {
     "rows": {"label": "level", "key": "measurement.noise.level", "values": [0.0, 0.2]},
     "columns": {"label": "rate", "key": "measurement.rate_Hz", "values": [1]},
 }
-# With one batch of a simulated case, and of a recorded trace.
 CHANGES: dict[str, tuple[dict[str, Any], dict[str, int]]] = {
-    "nothing": ({}, {}),
     "noise": (
         {"measurement": {"noise": {"level": 0.2}}},
-        {"measurement": 1, "identification": 2, "model_fits": 1, "intervals": 1, "judgement": 1}
-        | {"recorded_judgement": 1, "mechanics": 1}
-        | RECORDED
-        | STUDY,
+        TRACES | {"recorded_judgement": 1, "mechanics": 1} | RECORDED | STUDY,
     ),
     "models to compare": (
         {"model_selection": {"models": ["maxwell"]}},
         {"model_fits": 2, "recorded_judgement": 1, "case_tables": 1, "recorded_case_figures": 1}
-        | {"tables": 1, "claims": 1, "page": 1},
+        | TOLD,
     ),
     "a case, and the title of another": (
         {"cases": {"new": CELL, "liquid_drop_2": {"title": "A drop"}}},
-        {"target": 1, "measurement": 1, "identification": 2, "model_fits": 1, "intervals": 1}
-        | {"judgement": 1, "mechanics": 1, "linearisation": 1, "case_tables": 2}
-        | {"case_figures": 1, "case_figures_without_valley": 1, "gripper_figures": 1}
+        {"target": 1, "mechanics": 1, "linearisation": 1, "case_tables": 2, "case_figures": 1}
+        | {"case_figures_without_valley": 1, "gripper_figures": 1}
+        | TRACES
         | STUDY,
     ),
     "seeds": (
@@ -50,7 +48,7 @@ CHANGES: dict[str, tuple[dict[str, Any], dict[str, int]]] = {
         {"cases": {"mine": {"measurement": {"until_s": 300.0}}}},
         {"recording": 1, "identification": 2, "model_fits": 1, "recorded_judgement": 1}
         | {"case_tables": 1, "recorded_case_figures": 1}
-        | {"tables": 1, "claims": 1, "page": 1},
+        | TOLD,
     ),
     # Whose points have no figures of their own.
     "budget of a method, and a sweep": (
@@ -73,10 +71,10 @@ def test_a_dry_run_says_which_setting_changed_from_what_to_what(tiny: Path) -> N
     """Of the command line, from which a number in a block comes as text."""
     block = "evaluation={near_noise_tolerance: 0.03}"
     told = dry_run(tiny, "--config", block, config=TINY)
-    assert told.jobs == RECORDED | STUDY
+    assert jobs_of(told) == RECORDED | STUDY
     for when, value in (("before", 0.02), ("now", 0.03)):
         evaluation = f"'evaluation': {{'optimum_tolerance': 1.0, 'near_noise_tolerance': {value}}}"
-        assert re.search(rf"{when}: {{[^:]*{evaluation}", told.output)
+        assert re.search(rf"{when}: {{[^:]*{evaluation}", told)
 
 
 def test_an_edited_or_older_trace_in_the_place_of_another_is_read(tiny_copy: Path) -> None:
@@ -90,8 +88,8 @@ def test_an_edited_or_older_trace_in_the_place_of_another_is_read(tiny_copy: Pat
         trace.write_text("".join([first, *kept]))
         os.utime(trace, (1.5e9, 1.5e9))
         told = dry_run(tiny_copy, "--", "results/measurements/mine/seeds_0-0.npz", config=TINY)
-        assert told.jobs == jobs
-        said = re.search(r"before: \{'recorded': '\w+'\} now: \{'recorded': '\w+'\}", told.output)
+        assert jobs_of(told) == jobs
+        said = re.search(r"before: \{'recorded': '\w+'\} now: \{'recorded': '\w+'\}", told)
         assert bool(said) == bool(jobs)
 
 
@@ -103,8 +101,8 @@ def test_an_edit_of_the_library_runs_everything_again_and_is_named(
     with (tmp_path / "src" / "biogrip" / "arrays.py").open("a") as module:
         module.write("# An edit.\n")
     told = dry_run(tiny, config=TINY, snakefile=tmp_path / "Snakefile")
-    assert told.jobs["target"] == told.jobs["recording"] == 1
-    assert re.search(r"before: .*'source': '\w+'.* now: .*'source': '\w+'", told.output)
+    assert jobs_of(told)["target"] == jobs_of(told)["recording"] == 1
+    assert re.search(r"before: .*'source': '\w+'.* now: .*'source': '\w+'", told)
 
 
 @pytest.mark.nightly
