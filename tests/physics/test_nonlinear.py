@@ -14,7 +14,7 @@ from biogrip.physics.gripper import Arm, Gripper, rotation_of_tip
 from biogrip.physics.models import damper, generalized_maxwell, kelvin_voigt, maxwell
 from biogrip.physics.nonlinear import correction, nonlinear_rotation
 from biogrip.physics.protocol import Course, Phase, evaluate, hold, join_phases
-from biogrip.physics.response import linear_jaw_force, step_response, superpose
+from biogrip.physics.response import step_response, superpose
 from biogrip.physics.simulation import compute_grip, jaw_force
 from tests.helpers.responses import random_samples
 
@@ -157,11 +157,10 @@ CELL = np.array([[35.0, 12.3, 299.9, 1e-3]])
 
 
 def test_of_a_liquid_nothing_is_left_in_the_end(gripper: Gripper) -> None:
-    liquid = step_response(gripper, maxwell([[1.0, 10.0]]), force=True)
-    assert liquid.static[0, 0] == 0
-    torque = join_phases((hold(5000.0, 1.6e-9),))
-    late = linear_jaw_force(liquid, torque, np.array([1000.0, 2000.0]))[0]
-    slow = liquid.rates.real.max()
+    liquid, torque = maxwell([[1.0, 10.0]]), join_phases((hold(5000.0, 1.6e-9),))
+    late_s = np.array([1000.0, 2000.0])
+    late = jaw_force(gripper, liquid, torque, late_s, nonlinear=False)[0]
+    slow = step_response(gripper, liquid).rates.real.max()
     assert late[1] / late[0] == pytest.approx(np.exp(1000 * slow), rel=1e-12)
     assert 0 < late[1] < 1e-14
 
@@ -205,6 +204,9 @@ def test_pressed_throughout_or_never(gripper: Gripper, steps: Course) -> None:
 def test_unequal_arms_rest_where_their_springs_hold_the_torques(unequal_gripper: Gripper) -> None:
     network, b = generalized_maxwell([20.0, 5.0, 80.0, 1.0]), unequal_gripper.lever_m
     rest = np.linalg.solve(np.diag([4.4e-7, 5.5e-7]) + 5.0 * b**2, [1.0, 1.0])
-    for force, expected in ((False, rest), (True, [5.0 * b * rest.sum()])):
-        found = step_response(unequal_gripper, network, force=force).static[0]
-        np.testing.assert_allclose(found, expected, rtol=1e-14)
+    given = unequal_gripper, network, join_phases((hold(1e5, 1.0),)), np.array([1e5])
+    force = jaw_force(*given, nonlinear=False)[0]
+    response = step_response(*given[:2])
+    turned = [superpose(response, *given[2:], arm)[0] for arm in (0, 1)]
+    np.testing.assert_allclose(np.ravel(turned), rest, rtol=1e-12)
+    np.testing.assert_allclose(force, 5.0 * b * rest.sum(), rtol=1e-14)

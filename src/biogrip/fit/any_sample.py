@@ -159,7 +159,7 @@ class AnySampleFit:
         """Return what it leaves of the readings, (n_samples,), and a basis of what it absorbs."""
         own, lags, residuals = self.amplitudes > 0, self.lags, self.lags.residuals
         trace, course = residuals.trace, residuals.course
-        shown = mode_responses(-lags.rates[own][None], course, trace.time_s)[0][0]
+        shown = mode_responses(-lags.rates[own][None], course, trace.time_s)[0]
         shown *= (1.0 if course.deforms else -1.0) / lags.sizes[own, None]
         shown = trace.condensed.cleared(shown)
         residual: Array = trace.cleared - self.amplitudes[own] @ shown

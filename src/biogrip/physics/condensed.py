@@ -190,7 +190,7 @@ class Condensed:
             return np.empty(0), self._triangle(np.zeros_like(self.all_s))[:, :-1]
         dense, modes = self._dense, self._modes
         given = modes.rates[None], self.course, dense.time_s
-        responses = modes.scale[:, None] * mode_responses(*given, slopes=False)[0][0]
+        responses = modes.scale[:, None] * mode_responses(*given)[0]
         responses = dense.rows_of_values(responses)
         if self.whitening is not None:
             responses = self.whitening(responses)

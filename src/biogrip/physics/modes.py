@@ -65,16 +65,13 @@ def linear_responses(
     course: Course,
     time_s: Array,
     parameters: Array,
-    *,
-    slopes: bool = True,
 ) -> Array:
     """Compute what is read in the linear model, corrected eqs. (4)-(6), and d/d log p of it.
 
     Times, (n_times,), ascend; parameters, (n, n_parameters), are positive. Returns readings and
-    their derivatives, (n, 1 + n_parameters, n_times); without `slopes`, (n, 1, n_times).
+    their derivatives, (n, 1 + n_parameters, n_times).
     """
-    modes = compute_modes(gripper, model, course, parameters, slopes=slopes)
-    return sum_of_modes(modes, course, time_s)
+    return sum_of_modes(compute_modes(gripper, model, course, parameters), course, time_s)
 
 
 def sum_of_modes(modes: Modes, course: Course, time_s: Array) -> Array:
@@ -170,8 +167,7 @@ def _between_arms(
 def relaxation(network: Network, course: Course, time_s: Array) -> Array:
     """Compute the load on samples that a protocol deforms, (n, n_times)."""
     rates, weights = _branches(network)
-    decay, _ = mode_responses(rates, course, time_s, slopes=False)
-    load: Array = (weights[:, None] @ decay)[:, 0]
+    load: Array = (weights[:, None] @ mode_responses(rates, course, time_s))[:, 0]
     return load
 
 
@@ -195,32 +191,32 @@ def lag_course(course: Course, shares: Sequence[float]) -> Callable[[Array], Arr
     rates, sign = -1 / (course.end_s * np.array(shares)), 1.0 if course.deforms else -1.0
 
     def lagged(time_s: Array) -> Array:
-        lags: Array = sign * mode_responses(rates[None], course, time_s, slopes=False)[0][0]
+        lags: Array = sign * mode_responses(rates[None], course, time_s)[0]
         return lags
 
     return lagged
 
 
-def mode_responses(
-    rates: Array, course: Course, time_s: Array, *, slopes: bool = True
-) -> tuple[Array, Array]:
-    """Compute responses of modes of unit weight, or of branches of unit stiffness, and dg/dr.
+def mode_responses(rates: Array, course: Course, time_s: Array) -> Array:
+    """Compute responses of modes of unit weight, or of branches of unit stiffness.
 
     Rates in 1/s, (n, n_modes), are real, negative or zero. Times, (n_times,), ascend; at the very
-    instant of a step is what precedes it, and before the protocol nothing responds. Both results
-    are (n, n_modes, n_times), in units of what is controlled, and those times s. Without `slopes`
-    the responses are returned in their place.
+    instant of a step is what precedes it, and before the protocol nothing responds. Responses are
+    (n, n_modes, n_times), in units of what is controlled.
     """
-    both = np.zeros((1 + slopes, *rates.shape, len(time_s)))
-    for here, found in responses_in_turn(rates, course, time_s, slopes=slopes):
-        both[..., here] = found
-    return both[0], both[-1]
+    responses = np.zeros((*rates.shape, len(time_s)))
+    for here, (found,) in responses_in_turn(rates, course, time_s, slopes=False):
+        responses[..., here] = found
+    return responses
 
 
 def responses_in_turn(
     rates: Array, course: Course, time_s: Array, *, slopes: bool = True
 ) -> Iterator[tuple[slice, Array]]:
-    """Yield parts of the times after the start, and what `mode_responses` finds there, stacked."""
+    """Yield parts of the times after the start, and responses there stacked on dg/dr.
+
+    Responses are those of `mode_responses`; without `slopes` there are no derivatives.
+    """
     if course.sweeps:
         yield slice(None), moduli_of_modes(rates, time_s)[: 1 + slopes]
         return

@@ -130,7 +130,7 @@ class Residuals:
 
     def __call__(self, log_parameters: Array) -> tuple[Array, Array]:
         """Return residuals, (n_samples,), and derivatives, (n_parameters, n_samples)."""
-        rows = self._simulated(log_parameters[None], self.trace.time_s)[0]
+        rows = self._simulated(log_parameters)
         cleared = self.trace.condensed.cleared
         return cleared(rows[0]) - self.trace.cleared, cleared(rows[1:])
 
@@ -141,7 +141,8 @@ class Residuals:
 
     def response(self, log_parameters: Array) -> Array:
         """Return the simulated response, neither cleared nor whitened, (n_samples,)."""
-        return self._simulated(log_parameters[None], self.trace.time_s)[0, 0]
+        response: Array = self._simulated(log_parameters)[0]
+        return response
 
     def gradients(
         self, log_parameters: Array, others: Sequence["Residuals"]
@@ -198,6 +199,7 @@ class Residuals:
         given = self.gripper, network, self.course, trace.time_s
         return find_ring(*given, lambda change: trace.condensed.cleared(change) / noise_sd)
 
-    def _simulated(self, log_parameters: Array, time_s: Array) -> Array:
-        parameters = np.exp(log_parameters)
-        return linear_responses(self.gripper, self.model, self.course, time_s, parameters)
+    def _simulated(self, log_parameters: Array) -> Array:
+        given = self.gripper, self.model, self.course, self.trace.time_s
+        rows: Array = linear_responses(*given, np.exp(log_parameters[None]))[0]
+        return rows

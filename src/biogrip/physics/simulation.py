@@ -15,12 +15,7 @@ from biogrip.arrays import Array
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.modes import mode_responses, relaxation
 from biogrip.physics.protocol import Course
-from biogrip.physics.response import (
-    LEFT,
-    linear_jaw_force,
-    step_response,
-    superpose,
-)
+from biogrip.physics.response import LEFT, linear_jaw_force, step_response, superpose
 from biogrip.physics.sample_model import Network
 
 
@@ -38,8 +33,7 @@ def jaw_force(
     By either model, as in `simulated_response`; at the instant of a step: what follows it. Without
     inertia, the force may jump.
     """
-    response = step_response(gripper, network, inertia=inertia, force=True)
-    force = linear_jaw_force(response, course, time_s)
+    force = linear_jaw_force(gripper, network, course, time_s, inertia=inertia)
     if nonlinear:
         from biogrip.physics.nonlinear import correction
 
@@ -118,7 +112,7 @@ def simulated_response(
     response = step_response(gripper, network, inertia=gripper.has_inertia)
     if gripper.has_inertia:
         return superpose(response, course, time_s)
-    growth, _ = mode_responses(response.rates, course, time_s, slopes=False)
+    growth = mode_responses(response.rates, course, time_s)
     rotation: Array = (response.weights[:, LEFT, None] @ growth)[:, 0]
     return rotation
 
