@@ -202,14 +202,20 @@ def _without_outliers(
     for _ in range(_ROUNDS):
         plain = experiment.of(time_s[kept], readings[kept])
         found = find(plain)
-        residual = plain.residuals.left(logs := np.log(found.parameters))
-        step = plain.residuals.trace.rounding
-        growth = compute_growth(residual, plain.residuals.response(logs), step)
-        struck = outliers_of(residual / growth, step)
+        residual = plain.residuals.left(np.log(found.parameters))
+        growth = _growth(plain, found)
+        struck = outliers_of(residual / growth, plain.residuals.trace.rounding)
         if not struck.any():
             break
         kept[np.flatnonzero(kept)[struck]] = False
     return kept, experiment.of(time_s[kept], readings[kept]), found
+
+
+def _growth(problem: TraceProblem, found: Fit) -> Array:
+    """Compute how the noise grows with the reading, by what a fit leaves, (n_samples,)."""
+    residuals, logs = problem.residuals, np.log(found.parameters)
+    rounding = residuals.trace.rounding
+    return compute_growth(residuals.left(logs), residuals.response(logs), rounding)
 
 
 def _in_turn(
@@ -221,12 +227,7 @@ def _in_turn(
 ) -> tuple[TraceProblem, Fit, NoiseModel | None, tuple[float, float]]:
     """Estimate the noise from the residuals and fit again with it, until the fit converges."""
     problem, noise_model = plain, None
-    logs = np.log(found.parameters)
-    residuals = plain.residuals
-    growth = compute_growth(
-        residuals.left(logs), residuals.response(logs), residuals.trace.rounding
-    )
-    grows = experiment.coloured and np.ptp(growth) > 0
+    grows = experiment.coloured and np.ptp(_growth(plain, found)) > 0
     for _ in range(_ROUNDS):
         start = np.log(found.parameters)
         residual, sensitivity = plain.residuals(start)

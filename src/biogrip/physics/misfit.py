@@ -136,7 +136,7 @@ class SeriesMisfit:
         square = self._model_square_sums(static, rates, weights)
         square += self._square_sums.take(trace)
         product = static * self._projections_of_constant.take(trace)
-        product += _sum(weights * self.projections.of(trace, rates))
+        product += _sum(weights * self.projections(trace, rates))
         product *= 2
         square -= product
         np.maximum(square, 0, out=square)
@@ -145,7 +145,7 @@ class SeriesMisfit:
 
     @cached_property
     def _projections_of_constant(self) -> Array:
-        return self.projections(np.zeros(1))[:, 0]
+        return self.projections(np.arange(len(self._traces)), np.zeros(1))
 
     def _model_square_sums(self, static: Array, rates: Array, weights: Array) -> Array:
         """Sum squared responses over readings, (n,), as geometric series without cancellation."""

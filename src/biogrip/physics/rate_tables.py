@@ -81,12 +81,7 @@ class DecayTable:
         self._powers = np.ascontiguousarray(np.moveaxis(powers, 2, 0))
         self._end = np.nextafter(powers.shape[1], 0)
 
-    def __call__(self, rates: Array) -> Array:
-        """Return the sums at rates of any shape, shape (n_sums, ...)."""
-        every = np.arange(self._powers.shape[1]).reshape(-1, *np.ones(rates.ndim, dtype=int))
-        return self.of(every, rates)
-
-    def of(self, which: IntArray, rates: Array) -> Array:
+    def __call__(self, which: IntArray, rates: Array) -> Array:
         """Return sums of some indices, each at rates of its own; both broadcast."""
         place = np.fmin(np.log(1 - self._longest * rates) / (_WIDTH / _SHORTER), self._end)
         piece = place.astype(np.intp)
