@@ -26,7 +26,7 @@ from biogrip.arrays import Array, BoolArray
 from biogrip.digits import plain
 from biogrip.fit.least_squares import LeastSquaresSettings, fit_from, identify_many
 from biogrip.fit.problem import Fit, TraceProblem, silent
-from biogrip.physics.models import CANDIDATES, as_richer, contained_in, different_in
+from biogrip.physics.models import CANDIDATES, as_richer, contained, different_in
 from biogrip.physics.sample_model import SampleModel
 
 # Factors by which an element that has vanished exceeds a usual one, or falls short of it, at a
@@ -42,14 +42,13 @@ _TIMES = 6
 # Models that are equivalent in other parameters may improve one another in turn.
 _MOST_ROUNDS = 3
 
-Answers = list[Fit]
 Fits = dict[str, dict[int, Fit]]
 """Fits by candidate and index of the trace."""
 Worth = Callable[[str, int, Fits], bool]
 """Tells of a candidate, a trace, and the fits so far, if it is worth another."""
 
 
-def deepen(problems: Sequence[TraceProblem], found: Sequence[Fit]) -> Answers:
+def deepen(problems: Sequence[TraceProblem], found: Sequence[Fit]) -> list[Fit]:
     """Return the fits of traces by one model, or lower ones with another relaxation time.
 
     Random starts may all miss a basin in which an element hardly shows. So every spring and its
@@ -187,7 +186,7 @@ def _take_simpler(problems: Mapping[str, Sequence[TraceProblem]], found: Fits) -
 def _worse(found: Fits) -> Iterator[tuple[str, str, int]]:
     """Yield model, nested model and trace where the nested one fits better; simple ones first."""
     for name in found:
-        for inner in contained_in(name, found):
+        for inner in filter(found.__contains__, contained(name)):
             for trace in filter(found[inner].__contains__, found[name]):
                 if _digits(found[inner][trace].misfit) < _digits(found[name][trace].misfit):
                     yield name, inner, trace

@@ -15,7 +15,7 @@ from biogrip.digits import counted, rounded
 from biogrip.fit.experiment import Experiment, pose
 from biogrip.fit.least_squares import fit_from, identify_many
 from biogrip.fit.nested_fits import deepen
-from biogrip.fit.noise_model_fit import NoiseModelLikelihood, compute_growth, outliers_of
+from biogrip.fit.noise_model_fit import NoiseModelLikelihood, growth_left, outliers_of
 from biogrip.fit.problem import Fit, Progress, TraceProblem, silent
 from biogrip.physics.noise import NoiseModel, drift_is_flow
 from biogrip.physics.simulation import simulated_response
@@ -147,8 +147,7 @@ def fit_least_squares(
     def find(problems: Sequence[TraceProblem], which: Sequence[int]) -> list[Fit]:
         of_traces = [rngs[trace] for trace in which]
         found = identify_many(problems, experiments[0].least_squares, of_traces, progress)
-        pairs = zip(problems, deepen(problems, found), strict=True)
-        return [fit.in_order(problem.residuals.model) for problem, fit in pairs]
+        return deepen(problems, found)
 
     plain = [trace for trace, experiment in enumerate(experiments) if experiment.plain]
     problems = pose([experiments[trace] for trace in plain], [traces[trace] for trace in plain])
@@ -203,19 +202,12 @@ def _without_outliers(
         plain = experiment.of(time_s[kept], readings[kept])
         found = find(plain)
         residual = plain.residuals.left(np.log(found.parameters))
-        growth = _growth(plain, found)
+        growth = growth_left(plain.residuals, np.log(found.parameters))
         struck = outliers_of(residual / growth, plain.residuals.trace.rounding)
         if not struck.any():
             break
         kept[np.flatnonzero(kept)[struck]] = False
     return kept, experiment.of(time_s[kept], readings[kept]), found
-
-
-def _growth(problem: TraceProblem, found: Fit) -> Array:
-    """Compute how the noise grows with the reading, by what a fit leaves, (n_samples,)."""
-    residuals, logs = problem.residuals, np.log(found.parameters)
-    rounding = residuals.trace.rounding
-    return compute_growth(residuals.left(logs), residuals.response(logs), rounding)
 
 
 def _in_turn(
@@ -227,7 +219,8 @@ def _in_turn(
 ) -> tuple[TraceProblem, Fit, NoiseModel | None, tuple[float, float]]:
     """Estimate the noise from the residuals and fit again with it, until the fit converges."""
     problem, noise_model = plain, None
-    grows = experiment.coloured and np.ptp(_growth(plain, found)) > 0
+    growth = growth_left(plain.residuals, np.log(found.parameters))
+    grows = experiment.coloured and np.ptp(growth) > 0
     for _ in range(_ROUNDS):
         start = np.log(found.parameters)
         residual, sensitivity = plain.residuals(start)

@@ -34,7 +34,7 @@ from biogrip.fit.nested_fits import (
     vanished,
     within_range,
 )
-from biogrip.fit.noise_model_fit import absorbed, compare_extremes, compute_growth
+from biogrip.fit.noise_model_fit import absorbed, compare_extremes, growth_left
 from biogrip.fit.problem import Fit, Progress, TraceProblem, silent
 from biogrip.fit.trace_fit import TraceFit, fit_least_squares
 from biogrip.identify.prepare import flow_of, for_trace
@@ -216,12 +216,9 @@ def _growth(diagnosis: Diagnosis) -> Array | None:
 
     Noise that grows by a rejected fit is its misfit.
     """
-    residuals, best = diagnosis.likelihood.problem.residuals, diagnosis.likelihood.best
     if diagnosis.status == REJECTED:
         return None
-    growth = compute_growth(
-        residuals.left(best), residuals.response(best), residuals.trace.rounding
-    )
+    growth = growth_left(diagnosis.likelihood.problem.residuals, diagnosis.likelihood.best)
     return growth if compare_extremes(growth) > CLEARLY else None
 
 

@@ -299,15 +299,10 @@ def contained(candidate: str) -> Mapping[str, tuple[Turned, ...]]:
     return found
 
 
-def contained_in(candidate: str, others: Collection[str]) -> list[str]:
-    """Return the names of those candidates among `others` that are nested in one."""
-    return [name for name in contained(candidate) if name in others]
-
-
 def different_in(candidate: str, others: Collection[str]) -> list[str]:
-    """Return the same names, with only one of models that are equivalent in other parameters."""
+    """Return those of `others` that are nested in one, and one of models that are equivalent."""
     found: list[str] = []
-    for name in contained_in(candidate, others):
+    for name in filter(others.__contains__, contained(candidate)):
         if not any(name in contained(other) and other in contained(name) for other in found):
             found.append(name)
     return found

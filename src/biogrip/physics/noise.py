@@ -222,9 +222,7 @@ _LEAST_NORM = 1 - 1e-9
 def nuisance_basis(time_s: Array, *, offset: bool, drift: bool) -> Array:
     """Return orthonormal functions of time, (n_functions, n_times), that span offset and drift."""
     functions = [np.ones_like(time_s)] * offset + [time_s] * drift
-    if not functions:
-        return np.zeros((0, len(time_s)))
-    return np.linalg.qr(np.stack(functions, axis=1))[0].T
+    return np.linalg.qr(np.reshape(functions, (-1, len(time_s))).T)[0].T
 
 
 def without(basis: Array, rows: Array) -> Array:
@@ -372,13 +370,11 @@ class Whitening:
         from celerite2 import driver
 
         flicker = flicker_rates(time_s)
-        rates = np.append(1 / noise_model.time_s, flicker)
-        shares = np.append(
-            noise_model.ar1, np.full(len(flicker), noise_model.flicker / len(flicker))
-        )
+        rates = np.concatenate(([1 / noise_model.time_s], flicker, [0.0]))
+        of_flicker = np.full(len(flicker), noise_model.flicker / len(flicker))
+        shares = np.concatenate(([noise_model.ar1], of_flicker, [noise_model.walk]))
         self._solve = driver.solve_lower
         walked = (time_s - time_s[0]) / np.mean(time_s - time_s[0])
-        rates, shares = np.append(rates, 0.0), np.append(shares, noise_model.walk)
         self._time_s, self._rates = np.ascontiguousarray(time_s, float), rates
         self._left = np.tile(shares, (len(time_s), 1))
         right = np.ones_like(self._left)

@@ -48,11 +48,6 @@ class Trace:
         return measure_rounding(self.readings)
 
     @cached_property
-    def noise_sd(self) -> float:
-        """Standard deviation of the noise, known or estimated."""
-        return self.scatter if self.known_noise is None else self.known_noise
-
-    @cached_property
     def scatter(self) -> float:
         """Standard deviation of the noise by neighbouring readings, whatever is known of it."""
         if self.known_scatter is not None:
@@ -101,8 +96,9 @@ class Residuals:
 
     @property
     def noise_scale(self) -> float:
-        """Standard deviation of the noise."""
-        return self.trace.noise_sd
+        """Standard deviation of the noise, known or estimated."""
+        trace = self.trace
+        return trace.scatter if trace.known_noise is None else trace.known_noise
 
     @cached_property
     def peak(self) -> float:
