@@ -16,7 +16,7 @@ References
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -178,8 +178,8 @@ def _take_simpler(problems: Mapping[str, Sequence[TraceProblem]], found: Fits) -
         simpler = found[inner][trace]
         parameters = as_richer(name, inner, simpler.parameters)
         reached = simpler.converged and not is_within(parameters, problems[name][trace])
-        found[name][trace] = found[name][trace].replaced(
-            parameters, simpler.misfit, converged=reached
+        found[name][trace] = replace(
+            found[name][trace], parameters=parameters, misfit=simpler.misfit, converged=reached
         )
 
 

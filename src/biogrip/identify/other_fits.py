@@ -247,7 +247,7 @@ def _at_own_onset(
     best = fits.near(fits.at(0.0, within_range(found.parameters, problem)))
     if best.misfit >= found.misfit:
         return found
-    return found.replaced(np.exp(best.log_parameters), best.misfit, converged=found.converged)
+    return replace(found, parameters=np.exp(best.log_parameters), misfit=best.misfit)
 
 
 _SAME_NETWORK = "liquid_drop", "zener_maxwell"

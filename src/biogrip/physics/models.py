@@ -164,7 +164,6 @@ GENERALIZED_MAXWELL = SampleModel(
         "liquid_drop": lambda k, k_p, c: (k, k_p, c, 0.0),
         "kelvin_voigt": lambda k_p, c_p: (0.0, k_p, 0.0, c_p),
     },
-    branched=_with_branches,
 )
 MAXWELL_MODELS = (
     GENERALIZED_MAXWELL,
@@ -259,9 +258,9 @@ class Sample:
         """The constitutive model."""
         model = MODELS[self.name]
         if self.branches != 1:
-            if model.branched is None:
+            if model is not GENERALIZED_MAXWELL:
                 raise ValueError(f"{self.name} has no number of branches")
-            model = model.branched(self.branches)
+            model = _with_branches(self.branches)
         return model if self.stiffness == "N/m" else in_units(model, self.stiffness)
 
     @property
@@ -273,13 +272,8 @@ class Sample:
 CANDIDATES: dict[str, Sample] = {
     sample.candidate: sample
     for sample in (
-        *(Sample(name) for name in MODELS),
-        *(
-            Sample(name, branches)
-            for name, model in MODELS.items()
-            if model.branched
-            for branches in range(2, MOST_BRANCHES + 1)
-        ),
+        *map(Sample, MODELS),
+        *(Sample(GENERALIZED_MAXWELL.name, more) for more in range(2, MOST_BRANCHES + 1)),
     )
 }
 """Models that a trace may be fitted with, by name with the number of branches."""

@@ -25,7 +25,7 @@ References
 .. [3] J. D. Ferry, Viscoelastic Properties of Polymers, Wiley, 1980, chapter 3.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -182,19 +182,15 @@ def _branches(network: Network) -> tuple[NDArray[Any], NDArray[Any]]:
     return np.concatenate((rates, fixed), axis=1), np.concatenate((weights, bare), axis=1)
 
 
-def lag_course(course: Course, shares: Sequence[float]) -> Callable[[Array], Array]:
-    """Return a function of ascending times for loads that lag behind, (n_lags, n_times).
+def lag_course(course: Course, shares: Sequence[float], time_s: Array) -> Array:
+    """Return loads that lag behind, (n_lags, n_times), at ascending times.
 
     Of a deformation, they are the forces of springs that forget it with these relaxation times,
     given as shares of the protocol's duration.
     """
     rates, sign = -1 / (course.end_s * np.array(shares)), 1.0 if course.deforms else -1.0
-
-    def lagged(time_s: Array) -> Array:
-        lags: Array = sign * mode_responses(rates[None], course, time_s)[0]
-        return lags
-
-    return lagged
+    lags: Array = sign * mode_responses(rates[None], course, time_s)[0]
+    return lags
 
 
 def mode_responses(rates: Array, course: Course, time_s: Array) -> Array:

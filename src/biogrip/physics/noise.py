@@ -272,7 +272,7 @@ def drift_is_flow(course: Course, time_s: Array) -> bool:
     if course.deforms:
         return False
     constant = nuisance_basis(time_s, offset=True, drift=False)
-    flows = without(constant, _LAG * lag_course(course, (_LAG,))(time_s))
+    flows = without(constant, _LAG * lag_course(course, (_LAG,), time_s))
     drift = without(constant, time_s / course.end_s)
     basis = np.linalg.qr(flows.T)[0].T
     return bool(np.sum(without(basis, drift) ** 2) < _LEAST_SHARE_OF_DRIFT * np.sum(drift**2))
