@@ -200,13 +200,13 @@ class Experiment:
 
         `model`, `noise_sd`, and `condensed` from `in_noise` replace those of the case.
         """
-        rows = condensed or self._condensed(time_s)
+        rows = condensed or self.in_noise(time_s)
         neighbours, freedom = None, np.inf
         if self.sd is not None and self.noise_sd is None:
             # Only ratios count: deviations are as neighbours scatter in each half of the readings.
             neighbours = float(np.sqrt(np.mean(self.sd**2)))
             freedom = 0.5 * _OF_DIFFERENCES * len(readings)
-        trace = Trace(rows.all_s, readings, rows, noise_sd or self.noise_sd, neighbours)
+        trace = Trace(readings, rows, noise_sd or self.noise_sd, neighbours)
         given = self.gripper, model or self.searched, self.torque, trace
         posed = Residuals(*given, instrument=self.instrument, freedom=freedom)
         return make_problem(posed, self.ranges)
@@ -215,12 +215,8 @@ class Experiment:
         self, time_s: Array, traces: Sequence[Array], model: SampleModel | None = None
     ) -> list[TraceProblem]:
         """Pose the problems of several traces of the same times, which share their rows."""
-        rows = self._condensed(time_s)
+        rows = self.in_noise(time_s)
         return [self.of(time_s, readings, model, condensed=rows) for readings in traces]
-
-    def _condensed(self, time_s: Array) -> Condensed:
-        """Return rows for times, weighted if `sd` is known."""
-        return self.in_noise(time_s, None, np.zeros((0, len(time_s))))
 
     def rows_key(self, time_s: Array) -> Hashable:
         """Return what the rows of a trace depend on, whose times are (n_samples,)."""
@@ -240,18 +236,19 @@ class Experiment:
     def in_noise(
         self,
         time_s: Array,
-        noise_model: NoiseModel | None,
-        uncertain: Array,
+        noise_model: NoiseModel | None = None,
+        uncertain: Array | None = None,
         *,
         growing: Array | None = None,
     ) -> Condensed:
         """Condense the readings for autocorrelated noise or an uncertain gripper.
 
-        Noise without a model is white. Uncertain are functions added with a random amplitude, see
-        `with_uncertain`; noise may grow with a rotation, see `Whitening`: (n_functions, n_samples)
-        and (n_samples,).
+        Noise without a model is white, weighted if `sd` is known. Uncertain are functions added
+        with a random amplitude, see `with_uncertain`; noise may grow with a rotation, see
+        `Whitening`: (n_functions, n_samples) and (n_samples,).
         """
         nuisance = self.nuisance(time_s)
+        uncertain = nuisance[:0] if uncertain is None else uncertain
         rows = SweptRows if self.torque.sweeps else Condensed
         given = self.torque, self.torque.snapped(time_s)
         if noise_model is None and self.sd is not None:

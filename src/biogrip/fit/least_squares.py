@@ -11,8 +11,8 @@ References
 .. [2] J. Nocedal and S. J. Wright, Numerical Optimization, Springer, 2006, section 3.4.
 """
 
-from bisect import insort
-from collections.abc import Sequence
+from collections import defaultdict
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -44,15 +44,10 @@ _AT_ONCE = 300_000
 
 def alike(problems: Sequence[TraceProblem]) -> list[IntArray]:
     """Group the indices of problems that one `LocalFits` can fit together."""
-    groups: list[list[int]] = []
+    groups = defaultdict[Hashable, list[int]](list)
     for index, problem in enumerate(problems):
-        for group in groups:
-            if problem.residuals.shares_responses(problems[group[0]].residuals):
-                group.append(index)
-                break
-        else:
-            groups.append([index])
-    return [np.array(group) for group in groups]
+        groups[problem.residuals.of_responses].append(index)
+    return [np.array(group) for group in groups.values()]
 
 
 class LocalFits:
@@ -301,13 +296,12 @@ def _best(found: Minima, which: BoolArray, count: int) -> IntArray:
 
 def _descents(found: Minima, before: Row) -> list[Row]:
     """Return the rows of a history: the given first one, and one for each fit."""
-    rows, evaluations, best, ordered = [before], before[3], 0, list[float]()
-    ranks, responses = found.misfit.astype(np.float32), _responses(found)
-    for fit, misfit in enumerate(found.misfit.tolist()):
-        evaluations += int(responses[fit])
+    rows, evaluations, best = [before], before[3], 0
+    ranks = found.misfit.astype(np.float32)
+    for fit, responses in enumerate(_responses(found).tolist()):
+        evaluations += responses
         best = fit if ranks[fit] < ranks[best] else best
-        insort(ordered, misfit)
-        median = 0.5 * (ordered[fit // 2] + ordered[(fit + 1) // 2])
+        median = float(np.median(found.misfit[: fit + 1]))
         rows.append((np.exp(found.x[best]), float(found.misfit[best]), median, evaluations))
     return rows
 

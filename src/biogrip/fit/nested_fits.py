@@ -57,11 +57,8 @@ def deepen(problems: Sequence[TraceProblem], found: Sequence[Fit]) -> list[Fit]:
     """
     model = problems[0].residuals.model
     names = model.names
-    pairs = [
-        (index, names.index(f"c{name[1:]}"))
-        for index, name in enumerate(names)
-        if name.startswith("k") and f"c{name[1:]}" in names and name != "k_p"
-    ]
+    dampers = {name: f"c{name[1:]}" for name in names if name[0] == "k" and name != "k_p"}
+    pairs = [(names.index(k), names.index(c)) for k, c in dampers.items() if c in names]
     if not pairs or model.power_law:
         return [*found]
     springs = [spring for spring, _ in pairs]

@@ -7,6 +7,7 @@ computed in turn, until none of them changes.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -73,8 +74,8 @@ _CONVERGED = 1e-2
 _STAYED = 0.03
 _WORTH_SAYING = 0.005
 
-Find = Callable[[TraceProblem], Fit]
-"""Function that finds the global optimum of a problem."""
+Find = Callable[[Sequence[TraceProblem]], list[Fit]]
+"""Function that finds the global optima of problems."""
 
 
 @dataclass(frozen=True)
@@ -158,25 +159,17 @@ def fit_least_squares(
     }
     for trace, experiment in enumerate(experiments):
         if trace not in found:
-
-            def find_alone(problem: TraceProblem, trace: int = trace) -> Fit:
-                return find([problem], [trace])[0]
-
-            found[trace] = _fit_in_noise(experiment, *traces[trace], find_alone)
+            alone = partial(find, which=[trace])
+            found[trace] = _fit_in_noise(experiment, *traces[trace], alone)
     return [found[trace] for trace in range(len(traces))]
 
 
 def _fit_in_noise(experiment: Experiment, time_s: Array, readings: Array, find: Find) -> TraceFit:
-    kept = np.ones(len(time_s), dtype=bool)
-    if experiment.coloured:
-        kept, plain, found = _without_outliers(experiment, time_s, readings, find)
-    else:
-        plain = experiment.of(time_s, readings)
-        found = find(plain)
+    kept, plain, found = _without_outliers(experiment, time_s, readings, find)
     time_s, readings = time_s[kept], readings[kept]
     problem, found, noise_model, errors = _in_turn(experiment, time_s, readings, plain, found)
     # Slow deviations now weigh less, so that another basin may be the deepest.
-    other = find(problem)
+    (other,) = find([problem])
     if np.float32(other.misfit) < np.float32(found.misfit):
         found = other
     along = _fitted_along(experiment, time_s)
@@ -197,17 +190,20 @@ def _fitted_along(experiment: Experiment, time_s: Array) -> str:
 def _without_outliers(
     experiment: Experiment, time_s: Array, readings: Array, find: Find
 ) -> tuple[BoolArray, TraceProblem, Fit]:
-    kept = np.ones(len(time_s), dtype=bool)
+    """Strike outliers, if the noise may have any, and fit again, until there are no more."""
+    kept, plain = np.ones(len(time_s), dtype=bool), experiment.of(time_s, readings)
     for _ in range(_ROUNDS):
-        plain = experiment.of(time_s[kept], readings[kept])
-        found = find(plain)
+        (found,) = find([plain])
+        if not experiment.coloured:
+            break
         residual = plain.residuals.left(np.log(found.parameters))
         growth = growth_left(plain.residuals, np.log(found.parameters))
         struck = outliers_of(residual / growth, plain.residuals.trace.rounding)
         if not struck.any():
             break
         kept[np.flatnonzero(kept)[struck]] = False
-    return kept, experiment.of(time_s[kept], readings[kept]), found
+        plain = experiment.of(time_s[kept], readings[kept])
+    return kept, plain, found
 
 
 def _in_turn(

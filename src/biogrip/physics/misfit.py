@@ -46,7 +46,8 @@ def make_misfits(residuals: Sequence[Residuals]) -> Misfits:
     the paper's: of a sample with one Maxwell branch between equal arms under steps of a torque,
     sampled uniformly from the start on, with a reading at each step, in white noise alone.
     """
-    if all(map(residuals[0].shares_responses, residuals)) and (series := _series_of(residuals)):
+    alike = len({each.of_responses for each in residuals}) == 1
+    if alike and (series := _series_of(residuals)):
         return series.of_each
     misfits = [make_misfit(each) for each in residuals]
 

@@ -110,7 +110,7 @@ def compute_modes(
         *of_modes, d_rates, d_weights = _between_arms(gripper, network, count)
         of_slopes = (of.transpose(2, 0, 1) for of in (d_rates, d_weights))
         return Modes(*map(np.ascontiguousarray, (*(of.T for of in of_modes), *of_slopes)))
-    both = [of.reshape(count + 1, -1, of.shape[1]) for of in _branches(network)]
+    both = [of.reshape(count + 1, -1, of.shape[1]) for of in elements_of(network)]
     rates, weights = (np.ascontiguousarray(of[0].real) for of in both)
     return Modes(rates, weights, *((of[1:].imag / _COMPLEX_STEP).swapaxes(0, 1) for of in both))
 
@@ -164,14 +164,7 @@ def _between_arms(
     return -x, weights, -moved, weight_slopes
 
 
-def relaxation(network: Network, course: Course, time_s: Array) -> Array:
-    """Compute the load on samples that a protocol deforms, (n, n_times)."""
-    rates, weights = _branches(network)
-    load: Array = (weights[:, None] @ mode_responses(rates, course, time_s))[:, 0]
-    return load
-
-
-def _branches(network: Network) -> tuple[NDArray[Any], NDArray[Any]]:
+def elements_of(network: Network) -> tuple[NDArray[Any], NDArray[Any]]:
     """Return rates and stiffnesses of elements side by side, (n, n_modes); of bare ones last."""
     bare = np.stack((network.k_p, _RATE_OF_A_DAMPER * network.c_p), axis=1)
     fixed = np.broadcast_to([0.0, -_RATE_OF_A_DAMPER], bare.shape)

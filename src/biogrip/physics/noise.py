@@ -215,10 +215,6 @@ def _words(name: str) -> tuple[int, ...]:
     return tuple(int.from_bytes(digest[i : i + 4], "big") for i in range(0, 16, 4))
 
 
-# Least squared norm of a function that is projected out completely, up to rounding.
-_LEAST_NORM = 1 - 1e-9
-
-
 def nuisance_basis(time_s: Array, *, offset: bool, drift: bool) -> Array:
     """Return orthonormal functions of time, (n_functions, n_times), that span offset and drift."""
     functions = [np.ones_like(time_s)] * offset + [time_s] * drift
@@ -250,11 +246,6 @@ def with_uncertain(basis: Array, functions: Array) -> Array:
     _, sizes, directions = np.linalg.svd(rest, full_matrices=False)
     shares = 1 - 1 / np.sqrt(1 + sizes**2)
     return np.vstack((basis, np.sqrt(shares)[:, None] * directions))
-
-
-def taken_out(basis: Array) -> int:
-    """Count the functions of a basis that are projected out completely."""
-    return int(np.count_nonzero(np.sum(np.square(basis), axis=1) > _LEAST_NORM))
 
 
 # A lag of so many protocols is an integral of the load.
