@@ -237,41 +237,21 @@ def best_of_starts(
     """
     answers: dict[int, Fit] = {}
     for group in alike(problems):
-        found = _best_of_alike(
-            [problems[index] for index in group],
-            [starts[index] for index in group],
-            [before[index] for index in group],
-            progress,
-            to_last_digits=to_last_digits,
-        )
-        answers.update(zip(group.tolist(), found, strict=True))
+        fits, traces = LocalFits([problems[index] for index in group]), np.arange(len(group))
+        rough, trace, fine, trace_of_fine = _finished(fits, [starts[index] for index in group])
+        winners = np.concatenate([_best(fine, trace_of_fine == own, 1) for own in traces])
+        best = refine_optima(fits, fine[winners], traces, to_last_digits=to_last_digits)
+        for own, index in enumerate(group.tolist()):
+            rows = _descents(rough[trace == own], before[index])
+            # Newton's steps are not counted: the last bits of a processor decide their number.
+            finished = _responses(fine)[trace_of_fine == own].sum()
+            misfit, evaluations = float(best.misfit[own]), rows[-1][3] + int(finished)
+            rows[-1] = np.exp(best.x[own]), misfit, misfit, evaluations
+            progress(evaluations, misfit)
+            steps, why, converged = len(rows) - 1, "all starts fitted", bool(best.converged[own])
+            given = rows[-1][0], misfit, steps, evaluations, why, History.of(rows), converged
+            answers[index] = Fit(*given)
     return [answers[index] for index in range(len(problems))]
-
-
-def _best_of_alike(
-    problems: Sequence[TraceProblem],
-    starts: Sequence[Array],
-    before: Sequence[Row],
-    progress: Progress,
-    *,
-    to_last_digits: bool,
-) -> list[Fit]:
-    fits, traces = LocalFits(problems), np.arange(len(problems))
-    rough, trace, fine, trace_of_fine = _finished(fits, starts)
-    winners = np.concatenate([_best(fine, trace_of_fine == own, 1) for own in traces])
-    best = refine_optima(fits, fine[winners], traces, to_last_digits=to_last_digits)
-    answers = []
-    for own, first_row in enumerate(before):
-        rows = _descents(rough[trace == own], first_row)
-        # Newton's steps are not counted: the last bits of a processor decide their number.
-        finished = _responses(fine)[trace_of_fine == own].sum()
-        misfit, evaluations = float(best.misfit[own]), rows[-1][3] + int(finished)
-        rows[-1] = np.exp(best.x[own]), misfit, misfit, evaluations
-        progress(evaluations, misfit)
-        steps, why, converged = len(rows) - 1, "all starts fitted", bool(best.converged[own])
-        given = rows[-1][0], misfit, steps, evaluations, why, History.of(rows), converged
-        answers.append(Fit(*given))
-    return answers
 
 
 def _finished(
