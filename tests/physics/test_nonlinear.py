@@ -201,14 +201,3 @@ def test_pressed_throughout_or_never(gripper: Gripper, steps: Course) -> None:
     nothing = join_phases((hold(10.0, 0.0),))
     grip = compute_grip(gripper, spring, nothing, nonlinear=False)
     assert (grip.largest_N, grip.lowest_N, grip.pulls_from_s) == (0, 0, None)
-
-
-def test_unequal_arms_rest_where_their_springs_hold_the_torques(unequal_gripper: Gripper) -> None:
-    network, b = generalized_maxwell([20.0, 5.0, 80.0, 1.0]), unequal_gripper.lever_m
-    rest = np.linalg.solve(np.diag([4.4e-7, 5.5e-7]) + 5.0 * b**2, [1.0, 1.0])
-    given = unequal_gripper, network, join_phases((hold(1e5, 1.0),)), np.array([1e5])
-    force = jaw_force(*given, nonlinear=False)[0]
-    response = step_response(*given[:2])
-    turned = [superpose(response, *given[2:], arm)[0] for arm in (0, 1)]
-    np.testing.assert_allclose(np.ravel(turned), rest, rtol=1e-12)
-    np.testing.assert_allclose(force, 5.0 * b * rest.sum(), rtol=1e-14)

@@ -113,18 +113,13 @@ class Experiment:
     @cached_property
     def searched(self) -> SampleModel:
         """Sample model without the fixed parameters."""
-        return with_fixed(self._on_clock(self.model), self.fixed)
+        return with_fixed(on_clock(self.model, self.unit_s), self.fixed)
 
     @property
     def unit_s(self) -> float:
         """Unit of time in which power laws hold as long as the protocol lasts."""
         lasts = 1.0 if self.instrument.sweeps else sum(phase.duration_s for phase in self.phases)
         return lasts if lasts < _SHORT_S else max(lasts / LONGEST_S, 1.0)
-
-    def _on_clock(self, model: SampleModel) -> SampleModel:
-        if not model.power_law or self.unit_s == 1:
-            return model
-        return on_clock(model, self.unit_s)
 
     def to_identify(self, *others: SampleModel) -> "Experiment":
         """Leave out noise model, gripper uncertainty, and ranges neither it nor `others` use."""
@@ -226,7 +221,7 @@ class Experiment:
 
     def for_model(self, problem: TraceProblem, model: SampleModel) -> TraceProblem:
         """Return one of its problems posed for another model; both share rows of the trace."""
-        residuals = replace(problem.residuals, model=self._on_clock(model))
+        residuals = replace(problem.residuals, model=on_clock(model, self.unit_s))
         return make_problem(residuals, self.ranges)
 
     def nuisance(self, time_s: Array) -> Array:
