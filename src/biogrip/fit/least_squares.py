@@ -11,6 +11,7 @@ References
 .. [2] J. Nocedal and S. J. Wright, Numerical Optimization, Springer, 2006, section 3.4.
 """
 
+from bisect import insort
 from collections import defaultdict
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
@@ -276,12 +277,13 @@ def _best(found: Minima, which: BoolArray, count: int) -> IntArray:
 
 def _descents(found: Minima, before: Row) -> list[Row]:
     """Return the rows of a history: the given first one, and one for each fit."""
-    rows, evaluations, best = [before], before[3], 0
-    ranks = found.misfit.astype(np.float32)
-    for fit, responses in enumerate(_responses(found).tolist()):
-        evaluations += responses
+    rows, evaluations, best, ordered = [before], before[3], 0, list[float]()
+    ranks, responses = found.misfit.astype(np.float32), _responses(found)
+    for fit, misfit in enumerate(found.misfit.tolist()):
+        evaluations += int(responses[fit])
         best = fit if ranks[fit] < ranks[best] else best
-        median = float(np.median(found.misfit[: fit + 1]))
+        insort(ordered, misfit)
+        median = 0.5 * (ordered[fit // 2] + ordered[(fit + 1) // 2])
         rows.append((np.exp(found.x[best]), float(found.misfit[best]), median, evaluations))
     return rows
 
