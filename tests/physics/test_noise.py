@@ -162,7 +162,7 @@ def test_flicker_has_equal_power_in_every_octave() -> None:
 @pytest.mark.parametrize("noise_model", COLOURS)
 def test_noise_of_the_colour_becomes_white(noise_model: NoiseModel) -> None:
     """Also what grows; matrices are of condition 1e5 at most, so that ten digits are left."""
-    growing = np.linspace(-3.0, 0.5, 300) ** 3 if noise_model.proportional else None
+    growing = np.linspace(-3.0, -0.5, 300) ** 3 if noise_model.proportional else None
     matrix = correlation(UNEVEN, noise_model, growing)
     whitening = Whitening(UNEVEN, noise_model, np.zeros((0, 300)), growing=growing)
     white = whitening(cholesky(matrix, lower=True).T)
