@@ -368,8 +368,8 @@ def refine_optima(
     if not to_last_digits:
         x = np.take_along_axis(closer.x, model.in_order(np.exp(closer.x)), axis=1)
         return Minima(x, closer.misfit, evaluations, closer.converged)
-    everyone = np.arange(len(found.x))
-    x, here, moving = found.x.copy(), fits.on_all_samples(found.x, trace), everyone
+    here, moving = fits.on_all_samples(found.x, trace), np.arange(len(found.x))
+    x, left, damping = found.x.copy(), np.full(len(moving), np.inf), np.zeros(len(moving))
     residuals = [fits.problems[own].residuals for own in trace.tolist()]
     sizes = [(each.trace.scatter, each.peak, each.samples) for each in residuals]
     scatter, peak, samples = np.array(sizes).T
@@ -387,8 +387,7 @@ def refine_optima(
             part[which[kept]] = new[kept]
         return kept
 
-    move(everyone, closer.x)
-    left, damping = np.full(len(x), np.inf), np.zeros(len(x))
+    move(moving, closer.x)
     for _ in range(_MOST_STEPS):
         if not len(moving):
             break

@@ -82,9 +82,8 @@ class Fit:
         way = self.history.best_parameters
         ordered = np.take_along_axis(way, model.in_order(way), axis=1)
         found = self.parameters[model.in_order(self.parameters[None])[0]]
-        return replace(
-            self, parameters=found, history=replace(self.history, best_parameters=ordered)
-        )
+        history = replace(self.history, best_parameters=ordered)
+        return replace(self, parameters=found, history=history)
 
 
 @dataclass(frozen=True)

@@ -64,7 +64,7 @@ class DenseSamples:
     if `dense` may nodes replace readings; otherwise each reading is a node.
     """
 
-    def __init__(self, course: Course, time_s: Array, *, dense: bool = True) -> None:
+    def __init__(self, course: Course, time_s: Array, *, dense: bool) -> None:
         self._all_s = time_s
         starts = course.changes_s
         self._starts_s = np.append(-np.inf, starts)

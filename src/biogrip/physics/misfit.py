@@ -92,7 +92,7 @@ class SeriesMisfit:
         interval_s: float,
         readings: Array,
     ) -> None:
-        self._simulated = (gripper, model, course, interval_s)
+        self._simulated = gripper, model, interval_s
         self._traces = np.atleast_2d(readings)
         self._samples = self._traces.shape[1]
         # Change of the torque at the start of each phase, and level after it.
@@ -129,7 +129,7 @@ class SeriesMisfit:
 
     def _of_some(self, parameters: Array, traces: IntArray) -> Array:
         shape = parameters.shape[:2]
-        gripper, model, _, interval_s = self._simulated
+        gripper, model, interval_s = self._simulated
         network = model.network(parameters.reshape(-1, parameters.shape[2]))
         static, rates, weights = two_modes(gripper.left, gripper.lever_m, network)
         rates *= interval_s
