@@ -72,7 +72,7 @@ class NoisyTrace:
 
     def misfit(self) -> Misfit:
         """Return the study's misfit of a population against the trace."""
-        trace = Trace(self.time_s, self.trace_rad, _condensed())
+        trace = Trace(self.trace_rad, _condensed())
         residuals = Residuals(self.gripper, self.model, self.steps, trace, instrument=GRIPPER)
         return make_misfit(residuals)
 

@@ -208,7 +208,7 @@ def residuals(name: str, readings: Array) -> Residuals:
     set_up, condensed = SET_UPS[name], _condensed(name)
     instrument = INSTRUMENTS[set_up.reads]
     gripper = _GRIPPER if instrument.has_jaws else NO_ARMS
-    trace = Trace(set_up.time_s, readings, condensed)
+    trace = Trace(readings, condensed)
     return Residuals(gripper, MODELS["maxwell"], condensed.course, trace, instrument=instrument)
 
 

@@ -24,7 +24,7 @@ from biogrip.files import write_text
 from biogrip.physics.modes import linear_responses
 from biogrip.physics.noise import standard_deviation, without
 from biogrip.physics.protocol import Phase, hold, join_phases, largest_load, sample_times
-from biogrip.physics.response import linear_jaw_force, step_response
+from biogrip.physics.response import linear_jaw_force
 from biogrip.physics.simulation import compute_grip, simulated_response
 from biogrip.study.config import DesignBlock
 from biogrip.study.source import default_config, overlaid, read_config
@@ -314,8 +314,8 @@ def _specimen(case: Case, block: DesignBlock, limits: Limits) -> Specimen:
     values = np.array([case.parameters[name] for name in model.names])
     unit = linear_responses(problem.gripper, model, step, elapsed_s, values[None])[0, 1:]
     if case.instrument.has_jaws:
-        pressing = step_response(case.gripper, network, inertia=False, force=True)
-        unit = np.vstack((unit, linear_jaw_force(pressing, step, elapsed_s)))
+        force = linear_jaw_force(case.gripper, network, step, elapsed_s, inertia=False)
+        unit = np.vstack((unit, force))
     read_s = elapsed_s[0 if case.instrument.has_jaws else 2 :: 2]
     return Specimen(case, values, noise, required, problem.nuisance(read_s), unit)
 

@@ -259,6 +259,8 @@ def test_long_steps_end_on_a_grid_or_at_a_bound() -> None:
 
 
 SLOPES = np.array([[3.0, 1.0], [1.0, 2.0], [0.0, 1.0]])
+# A start, bounds, and a tolerance.
+GIVEN = np.array([[-1.0, 1.0]]), np.full((1, 2), -2.0), np.full((1, 2), 2.0), 1e-8
 
 
 def linear(x: Array, _: IntArray) -> Normal:
@@ -279,8 +281,7 @@ def test_of_linear_residuals_the_decrease_is_as_predicted(monkeypatch: pytest.Mo
         damp(state, gained, predicted)  # type: ignore[arg-type]
 
     monkeypatch.setattr(levenberg_marquardt, "_damp", damped)
-    bounds = np.full((1, 2), -2.0), np.full((1, 2), 2.0)
-    found = minimize(linear, np.array([[-1.0, 1.0]]), *bounds, 1e-8)
+    found = minimize(linear, *GIVEN)
     assert found.x[0] == pytest.approx([0.5, -0.25], abs=1e-3)
     assert told[0][0] == pytest.approx(told[0][1], rel=1e-2)
     assert told[0][0] > 10
@@ -297,8 +298,7 @@ class UpTo:
 
 
 def test_a_step_that_is_impossible_is_shortened() -> None:
-    bounds = np.full((1, 2), -2.0), np.full((1, 2), 2.0)
-    found = minimize(linear, np.array([[-1.0, 1.0]]), *bounds, 1e-8, UpTo())  # type: ignore[arg-type]
+    found = minimize(linear, *GIVEN, UpTo())  # type: ignore[arg-type]
     assert 0.3 < found.x[0, 0] <= 0.4
 
 

@@ -67,7 +67,8 @@ def test_what_fits_worse_than_one_in_it_is_fitted_again(monkeypatch: pytest.Monk
         starts.append(given[-1][0])
         (fit,) = identify_many(*given, **options)
         times = len(starts)
-        return [fit.replaced(times * fit.parameters, times * fit.misfit, converged=times == 1)]
+        parameters, misfit = times * fit.parameters, times * fit.misfit
+        return [replace(fit, parameters=parameters, misfit=misfit, converged=times == 1)]
 
     monkeypatch.setattr(nested_fits, "deepen", lambda _, found: found)
     times, response = clean("endothelial_cell")
@@ -90,7 +91,6 @@ def test_elements_vanish_where_the_range_does_not_reach() -> None:
     assert without
     for answer, simpler in without:
         assert not nested_fits.is_within(answer.parameters, problems["liquid_drop"][0])
-        np.testing.assert_array_equal(answer.history.best_parameters[-1], answer.parameters)
         # It is as much the optimum as that of the simpler model is.
         assert simpler.converged
         assert answer.converged

@@ -86,8 +86,8 @@ def sample_of(model: str, seed: int) -> Array:
     return np.take_along_axis(values[None], MODELS[model].in_order(values[None]), 1)[0]
 
 
-def modulus(network: Network) -> Array:
-    storage, loss = complex_modulus(network, OMEGA)
+def modulus(network: Network, omega: Array = OMEGA) -> Array:
+    storage, loss = complex_modulus(network, omega)
     return storage[0] + 1j * loss[0]
 
 
@@ -118,10 +118,9 @@ def test_a_model_is_the_network_that_its_drawing_shows(
 @pytest.mark.parametrize("model", POWER_LAWS)
 @pytest.mark.parametrize("unit_s", [1e4, 1e-5])
 def test_a_power_law_holds_on_a_clock_of_another_unit(model: str, unit_s: float) -> None:
-    sample = sample_of(model, 1)
-    storage, loss = complex_modulus(on_clock(MODELS[model], unit_s).network(sample), OMEGA / unit_s)
-    exact = IMPEDANCES[model](1j * OMEGA / unit_s, *sample)
-    np.testing.assert_allclose(storage[0] + 1j * loss[0], exact, rtol=1e-6)
+    sample, omega = sample_of(model, 1), OMEGA / unit_s
+    found = modulus(on_clock(MODELS[model], unit_s).network(sample), omega)
+    np.testing.assert_allclose(found, IMPEDANCES[model](1j * omega, *sample), rtol=1e-6)
 
 
 @pytest.mark.parametrize("name", ["springpots_in_series", "springpots_in_parallel"])
@@ -155,11 +154,6 @@ TRIED = [name for name in CANDIDATES if name[-1] not in "5678"]
 PAIRS = [(richer, simpler) for richer in TRIED for simpler in contained(richer)]
 
 
-def of_candidate(candidate: str, rng: np.random.Generator) -> Array:
-    kinds = [parameter.kind for parameter in CANDIDATES[candidate].model.parameters]
-    return np.array([10 ** rng.uniform(*DECADES[kind]) for kind in kinds])
-
-
 def response(gripper: Gripper, candidate: str, parameters: Array, inertia: bool) -> Array:
     network = CANDIDATES[candidate].model.network(parameters)
     return superpose(step_response(gripper, network, inertia=inertia), TORQUE, TIME_S)[0]
@@ -171,9 +165,9 @@ def test_a_richer_model_becomes_the_simpler_one(
     gripper: Gripper, richer: str, simpler: str, inertia: bool
 ) -> None:
     """To rounding, of as many as eight branches."""
-    rng = np.random.default_rng(0)
+    rng, kinds = np.random.default_rng(0), [p.kind for p in CANDIDATES[simpler].model.parameters]
     for _ in range(3):
-        parameters = of_candidate(simpler, rng)
+        parameters = np.array([10 ** rng.uniform(*DECADES[kind]) for kind in kinds])
         expected = response(gripper, simpler, parameters, inertia)
         found = response(gripper, richer, as_richer(richer, simpler, parameters), inertia)
         assert np.max(np.abs(found - expected)) < 2e-11 * np.abs(expected).max()

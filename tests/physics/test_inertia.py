@@ -11,14 +11,16 @@ from biogrip import library
 from biogrip.arrays import Array
 from biogrip.judging.diagnosis import diagnose
 from biogrip.judging.doubts import DOUBT, Note
+from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.models import MODELS, generalized_maxwell
 from biogrip.physics.protocol import Course, hold, join_phases
 from biogrip.physics.response import LEFT, RIGHT, step_response, superpose
 from biogrip.physics.sample_model import Network
-from biogrip.physics.simulation import VISIBLE, elapsed_s, find_ring, ring, ringing_s
+from biogrip.physics.simulation import VISIBLE, elapsed_s, ring, ringing_s
 from tests.helpers.laplace import drawn, rotations, series
 from tests.helpers.problems import GRIPPER, MODEL, TORQUE
+from tests.physics.test_residuals import posed
 
 STEP, NONE = join_phases((hold(1.0, 1e-9),)), np.zeros((1, 0))
 RINGING = {"k": 35.0, "k_p": 12.3, "c": 299.9, "c_p": 1e-6}
@@ -44,11 +46,8 @@ def test_rings_are_over_when_they_are_said_to_be(either_gripper: Gripper, stiffn
     """Even those of a bare spring, from which only the arms' own dampers take energy."""
     spring = Network(np.array([stiffness]), np.zeros(1), NONE, NONE)
     after_s = ringing_s(either_gripper) * np.linspace(1.0, 1.5, 500)
-    with_it, without = (
-        superpose(step_response(either_gripper, spring, inertia=inertia), STEP, after_s)
-        for inertia in (True, False)
-    )
-    assert np.max(np.abs(with_it - without)) < 1e-14 * np.max(np.abs(without))
+    turned = superpose(step_response(either_gripper, spring), STEP, after_s)
+    assert np.max(np.abs(ring(either_gripper, spring, STEP, after_s))) < 1e-14 * turned.max()
 
 
 @pytest.mark.parametrize("beyond", [0.0, 1e-12, 1e-10, 1e-8, 1e-6])
@@ -76,19 +75,18 @@ def test_a_ring_shows_by_its_norm_beside_the_noise(gripper: Gripper) -> None:
     """All readings after the one that is named change by less than what counts."""
     time_s = np.random.default_rng(1).permutation(1e-4 * np.arange(1.0, 600.0))
     network = MODEL.sample(RINGING)
-    given = gripper, network, STEP, time_s
     # A parallel damper that is seen only while it rings does not end the ring.
     free = replace(network, c_p=np.zeros(1))
     change = np.where(time_s < ringing_s(gripper), ring(gripper, free, STEP, time_s)[0], 0.0)
     noise_sd = 0.1 * np.abs(change).max()
-    found = find_ring(*given, lambda rows: rows / noise_sd)
+    residuals = posed(gripper, MODEL, Condensed(STEP, time_s, np.zeros((0, len(time_s)))), change)
+    found = residuals.ring(network, noise_sd)
     assert found is not None
     assert found.largest == pytest.approx(10.0)
     lasts = found.lasts_s, found.lasts_s - 1e-9
     after, before = (np.linalg.norm(change[time_s > last]) / noise_sd for last in lasts)
     assert after <= VISIBLE < before
-    least = 0.99 * VISIBLE / np.linalg.norm(change)
-    assert find_ring(*given, lambda rows: least * rows) is None
+    assert residuals.ring(network, float(np.linalg.norm(change)) / (0.99 * VISIBLE)) is None
 
 
 def notes_of(model: str, time_s: Array, truth: dict[str, float]) -> list[Note]:

@@ -11,10 +11,10 @@ from scipy.integrate import solve_ivp
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.physics.gripper import Arm, Gripper, rotation_of_tip
-from biogrip.physics.models import damper, generalized_maxwell, kelvin_voigt, maxwell
+from biogrip.physics.models import MODELS, generalized_maxwell
 from biogrip.physics.nonlinear import correction, nonlinear_rotation
 from biogrip.physics.protocol import Course, Phase, evaluate, hold, join_phases
-from biogrip.physics.response import linear_jaw_force, step_response, superpose
+from biogrip.physics.response import step_response, superpose
 from biogrip.physics.simulation import compute_grip, jaw_force
 from tests.helpers.responses import random_samples
 
@@ -157,11 +157,10 @@ CELL = np.array([[35.0, 12.3, 299.9, 1e-3]])
 
 
 def test_of_a_liquid_nothing_is_left_in_the_end(gripper: Gripper) -> None:
-    liquid = step_response(gripper, maxwell([[1.0, 10.0]]), force=True)
-    assert liquid.static[0, 0] == 0
-    torque = join_phases((hold(5000.0, 1.6e-9),))
-    late = linear_jaw_force(liquid, torque, np.array([1000.0, 2000.0]))[0]
-    slow = liquid.rates.real.max()
+    liquid, torque = MODELS["maxwell"].network([1.0, 10.0]), join_phases((hold(5000.0, 1.6e-9),))
+    late_s = np.array([1000.0, 2000.0])
+    late = jaw_force(gripper, liquid, torque, late_s, nonlinear=False)[0]
+    slow = step_response(gripper, liquid).rates.real.max()
     assert late[1] / late[0] == pytest.approx(np.exp(1000 * slow), rel=1e-12)
     assert 0 < late[1] < 1e-14
 
@@ -180,7 +179,7 @@ def test_without_inertia_the_force_jumps(gripper: Gripper, steps: Course) -> Non
 
 def test_a_damper_is_pulled_from_the_drop_on(gripper: Gripper, steps: Course) -> None:
     """F = c_p delta': tau/b at first; after the drop (tau_2 - k phi)/b."""
-    grip = compute_grip(gripper, damper(10.0), steps, nonlinear=False)
+    grip = compute_grip(gripper, MODELS["damper"].network(10.0), steps, nonlinear=False)
     b, k_g = gripper.lever_m, 4.4e-7
     phi = 1.6e-9 / k_g * -math.expm1(-k_g * 200 / (2 * 10 * b * b))
     assert grip.largest_N == pytest.approx(1.6e-9 / b, rel=1e-5)
@@ -193,18 +192,12 @@ def test_a_damper_is_pulled_from_the_drop_on(gripper: Gripper, steps: Course) ->
 
 
 def test_pressed_throughout_or_never(gripper: Gripper, steps: Course) -> None:
-    for network in (generalized_maxwell([35.0, 12.3, 299.9, 1e-3]), kelvin_voigt([1.0, 0.0])):
+    spring = MODELS["kelvin_voigt"].network([1.0, 0.0])
+    for network in (generalized_maxwell(CELL), spring):
         grip = compute_grip(gripper, network, steps, nonlinear=False)
         assert (grip.pulls_from_s, grip.words()) == (None, None)
         # The start, when nothing presses yet, is not meant.
         assert 0.1 * grip.largest_N < grip.lowest_N < grip.largest_N
-    grip = compute_grip(gripper, damper(5.0), join_phases((hold(10.0, 0.0),)), nonlinear=False)
+    nothing = join_phases((hold(10.0, 0.0),))
+    grip = compute_grip(gripper, spring, nothing, nonlinear=False)
     assert (grip.largest_N, grip.lowest_N, grip.pulls_from_s) == (0, 0, None)
-
-
-def test_unequal_arms_rest_where_their_springs_hold_the_torques(unequal_gripper: Gripper) -> None:
-    network, b = generalized_maxwell([20.0, 5.0, 80.0, 1.0]), unequal_gripper.lever_m
-    rest = np.linalg.solve(np.diag([4.4e-7, 5.5e-7]) + 5.0 * b**2, [1.0, 1.0])
-    for force, expected in ((False, rest), (True, [5.0 * b * rest.sum()])):
-        found = step_response(unequal_gripper, network, force=force).static[0]
-        np.testing.assert_allclose(found, expected, rtol=1e-14)

@@ -51,8 +51,7 @@ def assert_alike(residuals: Residuals, x: Array) -> int:
 
 
 def posed(gripper: Gripper, model: SampleModel, rows: Condensed, trace: Array) -> Residuals:
-    given = Trace(rows.all_s, trace, rows)
-    return Residuals(gripper, model, rows.course, given, instrument=GRIPPER)
+    return Residuals(gripper, model, rows.course, Trace(trace, rows), instrument=GRIPPER)
 
 
 def noise(count: int) -> Array:

@@ -159,7 +159,7 @@ class AnySampleFit:
         """Return what it leaves of the readings, (n_samples,), and a basis of what it absorbs."""
         own, lags, residuals = self.amplitudes > 0, self.lags, self.lags.residuals
         trace, course = residuals.trace, residuals.course
-        shown = mode_responses(-lags.rates[own][None], course, trace.time_s)[0][0]
+        shown = mode_responses(-lags.rates[own][None], course, trace.time_s)[0]
         shown *= (1.0 if course.deforms else -1.0) / lags.sizes[own, None]
         shown = trace.condensed.cleared(shown)
         residual: Array = trace.cleared - self.amplitudes[own] @ shown
@@ -234,7 +234,7 @@ def proportional_deviations(problem: Experiment, time_s: Array, readings: Array)
     share, noise_sd = problem.noise_share or 0.0, problem.noise_sd
     nuisance = problem.nuisance(time_s)
     lags = [*spread_lags(problem.torque, time_s, _A_DECADE), _LASTING]
-    family = lag_course(problem.torque, lags)(time_s)
+    family = lag_course(problem.torque, lags, time_s)
     functions = np.vstack((family, nuisance, -nuisance))
     deviations = np.full(len(time_s), share * np.max(np.abs(readings)))
     for _ in range(_ROUNDS):
@@ -260,7 +260,7 @@ def swept_deviations(
     storage, (shortest_s, longest_s) = is_storage(places), SWEEP.spread_s(places)
     count = int(_RATES_A_DECADE * np.log10(_WIDER**2 * longest_s / shortest_s))
     lags_s = [*np.geomspace(shortest_s / _WIDER, longest_s * _WIDER, count), _LASTING * longest_s]
-    family = lag_course(SWEEP, lags_s)(places)
+    family = lag_course(SWEEP, lags_s, places)
     smooth, shares = readings, [share or 1.0] * 2
     for _ in range(_ROUNDS):
         amplitudes, _ = fit_responses(readings / smooth, family / smooth)

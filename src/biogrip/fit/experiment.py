@@ -113,18 +113,13 @@ class Experiment:
     @cached_property
     def searched(self) -> SampleModel:
         """Sample model without the fixed parameters."""
-        return with_fixed(self._on_clock(self.model), self.fixed)
+        return with_fixed(on_clock(self.model, self.unit_s), self.fixed)
 
     @property
     def unit_s(self) -> float:
         """Unit of time in which power laws hold as long as the protocol lasts."""
         lasts = 1.0 if self.instrument.sweeps else sum(phase.duration_s for phase in self.phases)
         return lasts if lasts < _SHORT_S else max(lasts / LONGEST_S, 1.0)
-
-    def _on_clock(self, model: SampleModel) -> SampleModel:
-        if not model.power_law or self.unit_s == 1:
-            return model
-        return on_clock(model, self.unit_s)
 
     def to_identify(self, *others: SampleModel) -> "Experiment":
         """Leave out noise model, gripper uncertainty, and ranges neither it nor `others` use."""
@@ -200,13 +195,13 @@ class Experiment:
 
         `model`, `noise_sd`, and `condensed` from `in_noise` replace those of the case.
         """
-        rows = condensed or self._condensed(time_s)
+        rows = condensed or self.in_noise(time_s)
         neighbours, freedom = None, np.inf
         if self.sd is not None and self.noise_sd is None:
             # Only ratios count: deviations are as neighbours scatter in each half of the readings.
             neighbours = float(np.sqrt(np.mean(self.sd**2)))
             freedom = 0.5 * _OF_DIFFERENCES * len(readings)
-        trace = Trace(rows.all_s, readings, rows, noise_sd or self.noise_sd, neighbours)
+        trace = Trace(readings, rows, noise_sd or self.noise_sd, neighbours)
         given = self.gripper, model or self.searched, self.torque, trace
         posed = Residuals(*given, instrument=self.instrument, freedom=freedom)
         return make_problem(posed, self.ranges)
@@ -215,12 +210,8 @@ class Experiment:
         self, time_s: Array, traces: Sequence[Array], model: SampleModel | None = None
     ) -> list[TraceProblem]:
         """Pose the problems of several traces of the same times, which share their rows."""
-        rows = self._condensed(time_s)
+        rows = self.in_noise(time_s)
         return [self.of(time_s, readings, model, condensed=rows) for readings in traces]
-
-    def _condensed(self, time_s: Array) -> Condensed:
-        """Return rows for times, weighted if `sd` is known."""
-        return self.in_noise(time_s, None, np.zeros((0, len(time_s))))
 
     def rows_key(self, time_s: Array) -> Hashable:
         """Return what the rows of a trace depend on, whose times are (n_samples,)."""
@@ -230,7 +221,7 @@ class Experiment:
 
     def for_model(self, problem: TraceProblem, model: SampleModel) -> TraceProblem:
         """Return one of its problems posed for another model; both share rows of the trace."""
-        residuals = replace(problem.residuals, model=self._on_clock(model))
+        residuals = replace(problem.residuals, model=on_clock(model, self.unit_s))
         return make_problem(residuals, self.ranges)
 
     def nuisance(self, time_s: Array) -> Array:
@@ -240,18 +231,19 @@ class Experiment:
     def in_noise(
         self,
         time_s: Array,
-        noise_model: NoiseModel | None,
-        uncertain: Array,
+        noise_model: NoiseModel | None = None,
+        uncertain: Array | None = None,
         *,
         growing: Array | None = None,
     ) -> Condensed:
         """Condense the readings for autocorrelated noise or an uncertain gripper.
 
-        Noise without a model is white. Uncertain are functions added with a random amplitude, see
-        `with_uncertain`; noise may grow with a rotation, see `Whitening`: (n_functions, n_samples)
-        and (n_samples,).
+        Noise without a model is white, weighted if `sd` is known. Uncertain are functions added
+        with a random amplitude, see `with_uncertain`; noise may grow with a rotation, see
+        `Whitening`: (n_functions, n_samples) and (n_samples,).
         """
         nuisance = self.nuisance(time_s)
+        uncertain = nuisance[:0] if uncertain is None else uncertain
         rows = SweptRows if self.torque.sweeps else Condensed
         given = self.torque, self.torque.snapped(time_s)
         if noise_model is None and self.sd is not None:

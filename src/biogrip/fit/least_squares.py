@@ -12,7 +12,8 @@ References
 """
 
 from bisect import insort
-from collections.abc import Sequence
+from collections import defaultdict
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -44,15 +45,10 @@ _AT_ONCE = 300_000
 
 def alike(problems: Sequence[TraceProblem]) -> list[IntArray]:
     """Group the indices of problems that one `LocalFits` can fit together."""
-    groups: list[list[int]] = []
+    groups = defaultdict[Hashable, list[int]](list)
     for index, problem in enumerate(problems):
-        for group in groups:
-            if problem.residuals.shares_responses(problems[group[0]].residuals):
-                group.append(index)
-                break
-        else:
-            groups.append([index])
-    return [np.array(group) for group in groups]
+        groups[problem.residuals.of_responses].append(index)
+    return [np.array(group) for group in groups.values()]
 
 
 class LocalFits:
@@ -242,41 +238,21 @@ def best_of_starts(
     """
     answers: dict[int, Fit] = {}
     for group in alike(problems):
-        found = _best_of_alike(
-            [problems[index] for index in group],
-            [starts[index] for index in group],
-            [before[index] for index in group],
-            progress,
-            to_last_digits=to_last_digits,
-        )
-        answers.update(zip(group.tolist(), found, strict=True))
+        fits, traces = LocalFits([problems[index] for index in group]), np.arange(len(group))
+        rough, trace, fine, trace_of_fine = _finished(fits, [starts[index] for index in group])
+        winners = np.concatenate([_best(fine, trace_of_fine == own, 1) for own in traces])
+        best = refine_optima(fits, fine[winners], traces, to_last_digits=to_last_digits)
+        for own, index in enumerate(group.tolist()):
+            rows = _descents(rough[trace == own], before[index])
+            # Newton's steps are not counted: the last bits of a processor decide their number.
+            finished = _responses(fine)[trace_of_fine == own].sum()
+            misfit, evaluations = float(best.misfit[own]), rows[-1][3] + int(finished)
+            rows[-1] = np.exp(best.x[own]), misfit, misfit, evaluations
+            progress(evaluations, misfit)
+            steps, why, converged = len(rows) - 1, "all starts fitted", bool(best.converged[own])
+            given = rows[-1][0], misfit, steps, evaluations, why, History.of(rows), converged
+            answers[index] = Fit(*given)
     return [answers[index] for index in range(len(problems))]
-
-
-def _best_of_alike(
-    problems: Sequence[TraceProblem],
-    starts: Sequence[Array],
-    before: Sequence[Row],
-    progress: Progress,
-    *,
-    to_last_digits: bool,
-) -> list[Fit]:
-    fits, traces = LocalFits(problems), np.arange(len(problems))
-    rough, trace, fine, trace_of_fine = _finished(fits, starts)
-    winners = np.concatenate([_best(fine, trace_of_fine == own, 1) for own in traces])
-    best = refine_optima(fits, fine[winners], traces, to_last_digits=to_last_digits)
-    answers = []
-    for own, first_row in enumerate(before):
-        rows = _descents(rough[trace == own], first_row)
-        # Newton's steps are not counted: the last bits of a processor decide their number.
-        finished = _responses(fine)[trace_of_fine == own].sum()
-        misfit, evaluations = float(best.misfit[own]), rows[-1][3] + int(finished)
-        rows[-1] = np.exp(best.x[own]), misfit, misfit, evaluations
-        progress(evaluations, misfit)
-        steps, why, converged = len(rows) - 1, "all starts fitted", bool(best.converged[own])
-        given = rows[-1][0], misfit, steps, evaluations, why, History.of(rows), converged
-        answers.append(Fit(*given))
-    return answers
 
 
 def _finished(
@@ -393,6 +369,7 @@ def refine_optima(
         x = np.take_along_axis(closer.x, model.in_order(np.exp(closer.x)), axis=1)
         return Minima(x, closer.misfit, evaluations, closer.converged)
     here, moving = fits.on_all_samples(found.x, trace), np.arange(len(found.x))
+    x, left, damping = found.x.copy(), np.full(len(moving), np.inf), np.zeros(len(moving))
     residuals = [fits.problems[own].residuals for own in trace.tolist()]
     sizes = [(each.trace.scatter, each.peak, each.samples) for each in residuals]
     scatter, peak, samples = np.array(sizes).T
@@ -400,36 +377,44 @@ def refine_optima(
     # Rounding errors of sums of squares.
     error = _ROUNDING * peak
     rounding = samples * error * (2 * here.misfit + error) / scatter**2
-    state = _State(fits, trace, rounding, found.x.copy(), here)
-    state.move(moving, closer.x)
-    left, damping = np.full(len(moving), np.inf), np.zeros(len(moving))
+
+    def move(which: IntArray, ahead: Array) -> BoolArray:
+        """Move fits to those points that are no worse on all readings; return their mask."""
+        there = fits.on_all_samples(ahead, trace[which])
+        kept = there.square_sum <= here.square_sum[which] + rounding[which]
+        x[which[kept]] = ahead[kept]
+        for part, new in zip(here.parts, there.parts, strict=True):
+            part[which[kept]] = new[kept]
+        return kept
+
+    move(moving, closer.x)
     for _ in range(_MOST_STEPS):
         if not len(moving):
             break
-        x = state.x[moving]
-        normal = _convex(fits, x, trace[moving])
-        normal.gradient = state.here.gradient[moving]
-        bounds = low[moving], high[moving]
-        plain = _newton_step(*bounds, normal, x, np.zeros(len(x)))
+        normal = convex(x[moving], moving)
+        normal.gradient = here.gradient[moving]
+        below = np.maximum(low[moving] - x[moving], -_LONGEST_STEP)
+        above = np.minimum(high[moving] - x[moving], _LONGEST_STEP)
+        damped = damping[moving, None]
+        plain = bounded_step(normal, np.zeros_like(damped), below, above)
         left[moving] = -np.sum(plain * normal.gradient, axis=1)
         converged = left <= np.maximum(_NOTHING * left_of_one, rounding)
-        step = _newton_step(*bounds, normal, x, damping[moving])
-        step = np.where(damping[moving, None] > 0, np.log1p(np.maximum(step, -0.9)), step)
+        step = bounded_step(normal, damped, below, above)
+        step = np.where(damped > 0, np.log1p(np.maximum(step, -0.9)), step)
         on = np.max(np.abs(plain), axis=1) >= _STILL
         moving, step, normal = moving[on], step[on], normal[on]
         if not len(moving):
             break
         evaluations[moving] += 2 + 2 * x.shape[1]
-        ahead = _on_grid(state.x[moving] + step, step, normal, low[moving], high[moving])
-        kept = state.move(moving, ahead)
+        kept = move(moving, _on_grid(x[moving] + step, step, normal, low[moving], high[moving]))
         more, less = _MORE * damping[moving], damping[moving] / _MORE
         less[less < _LITTLE] = 0.0
         damping[moving] = np.where(kept, less, np.maximum(more, _LITTLE))
         # A converged fit whose short step is rejected, too, is off its optimum by rounding only.
         moving = moving[kept | ~converged[moving] | (damping[moving] < _SHORT)]
-    x = np.take_along_axis(state.x, model.in_order(np.exp(state.x)), axis=1)
+    x = np.take_along_axis(x, model.in_order(np.exp(x)), axis=1)
     converged = left <= np.maximum(_UNTOLD * left_of_one, rounding)
-    return Minima(x, state.here.misfit, evaluations, converged)
+    return Minima(x, here.misfit, evaluations, converged)
 
 
 def _on_grid(x: Array, step: Array, normal: Normal, low: Array, high: Array) -> Array:
@@ -443,33 +428,6 @@ def _on_grid(x: Array, step: Array, normal: Normal, low: Array, high: Array) -> 
     far = np.max(np.abs(step), axis=1, keepdims=True) > _FAR
     rounded = far & (x > low) & (x < high)
     return np.clip(np.where(rounded, np.rint(x / spacing) * spacing, x), low, high)
-
-
-@dataclass
-class _State:
-    """Points of the fits, with their sums of squares and gradients from all readings."""
-
-    fits: LocalFits
-    trace: IntArray
-    rounding: Array
-    x: Array
-    here: Normal
-
-    def move(self, which: IntArray, x: Array) -> BoolArray:
-        """Move fits to those points that are no worse on all readings; return their mask."""
-        there = self.fits.on_all_samples(x, self.trace[which])
-        kept = there.square_sum <= self.here.square_sum[which] + self.rounding[which]
-        moved = which[kept]
-        self.x[moved] = x[kept]
-        for part, new in zip(self.here.parts, there.parts, strict=True):
-            part[moved] = new[kept]
-        return kept
-
-
-def _newton_step(low: Array, high: Array, normal: Normal, x: Array, damping: Array) -> Array:
-    below = np.maximum(low - x, -_LONGEST_STEP)
-    above = np.minimum(high - x, _LONGEST_STEP)
-    return bounded_step(normal, damping[:, None], below, above)
 
 
 def _convex(fits: LocalFits, x: Array, trace: IntArray) -> Normal:

@@ -16,7 +16,7 @@ References
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -26,7 +26,7 @@ from biogrip.arrays import Array, BoolArray
 from biogrip.digits import plain
 from biogrip.fit.least_squares import LeastSquaresSettings, fit_from, identify_many
 from biogrip.fit.problem import Fit, TraceProblem, silent
-from biogrip.physics.models import CANDIDATES, as_richer, contained_in, different_in
+from biogrip.physics.models import CANDIDATES, as_richer, contained, different_in
 from biogrip.physics.sample_model import SampleModel
 
 # Factors by which an element that has vanished exceeds a usual one, or falls short of it, at a
@@ -42,14 +42,13 @@ _TIMES = 6
 # Models that are equivalent in other parameters may improve one another in turn.
 _MOST_ROUNDS = 3
 
-Answers = list[Fit]
 Fits = dict[str, dict[int, Fit]]
 """Fits by candidate and index of the trace."""
 Worth = Callable[[str, int, Fits], bool]
 """Tells of a candidate, a trace, and the fits so far, if it is worth another."""
 
 
-def deepen(problems: Sequence[TraceProblem], found: Sequence[Fit]) -> Answers:
+def deepen(problems: Sequence[TraceProblem], found: Sequence[Fit]) -> list[Fit]:
     """Return the fits of traces by one model, or lower ones with another relaxation time.
 
     Random starts may all miss a basin in which an element hardly shows. So every spring and its
@@ -58,11 +57,8 @@ def deepen(problems: Sequence[TraceProblem], found: Sequence[Fit]) -> Answers:
     """
     model = problems[0].residuals.model
     names = model.names
-    pairs = [
-        (index, names.index(f"c{name[1:]}"))
-        for index, name in enumerate(names)
-        if name.startswith("k") and f"c{name[1:]}" in names and name != "k_p"
-    ]
+    dampers = {name: f"c{name[1:]}" for name in names if name[0] == "k" and name != "k_p"}
+    pairs = [(names.index(k), names.index(c)) for k, c in dampers.items() if c in names]
     if not pairs or model.power_law:
         return [*found]
     springs = [spring for spring, _ in pairs]
@@ -179,15 +175,15 @@ def _take_simpler(problems: Mapping[str, Sequence[TraceProblem]], found: Fits) -
         simpler = found[inner][trace]
         parameters = as_richer(name, inner, simpler.parameters)
         reached = simpler.converged and not is_within(parameters, problems[name][trace])
-        found[name][trace] = found[name][trace].replaced(
-            parameters, simpler.misfit, converged=reached
+        found[name][trace] = replace(
+            found[name][trace], parameters=parameters, misfit=simpler.misfit, converged=reached
         )
 
 
 def _worse(found: Fits) -> Iterator[tuple[str, str, int]]:
     """Yield model, nested model and trace where the nested one fits better; simple ones first."""
     for name in found:
-        for inner in contained_in(name, found):
+        for inner in filter(found.__contains__, contained(name)):
             for trace in filter(found[inner].__contains__, found[name]):
                 if _digits(found[inner][trace].misfit) < _digits(found[name][trace].misfit):
                     yield name, inner, trace

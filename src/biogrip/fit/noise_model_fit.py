@@ -25,6 +25,7 @@ import numpy as np
 
 from biogrip.arrays import Array, BoolArray
 from biogrip.physics.noise import ROOT_12, NoiseModel, Whitening
+from biogrip.physics.residuals import Residuals
 
 FAR = 4.5
 """Threshold in standard deviations of the noise, exceeded by one Gaussian reading in 150,000."""
@@ -85,6 +86,12 @@ def compute_growth(residual: Array, readings: Array, rounding: float = 0.0) -> A
         lambda odds: _deviance(apart, _growth(odds, size)), bounds=(_GROWTH_LEAST, _GROWTH_MOST)
     )
     return _growth(float(found.x), size)
+
+
+def growth_left(residuals: Residuals, log_parameters: Array) -> Array:
+    """Compute how the noise grows with a sample's response, from what it leaves of a trace."""
+    left, response = residuals.left(log_parameters), residuals.response(log_parameters)
+    return compute_growth(left, response, residuals.trace.rounding)
 
 
 def compare_extremes(growth: Array) -> float:

@@ -68,36 +68,22 @@ class Fit:
     stop_reason: str
     """Reason why the method stopped."""
     history: History = field(repr=False)
-    """Course of the identification."""
+    """Course of the identification; that of what was fitted first, where more fits followed."""
     converged: bool = True
     """False if the final Newton refinement of the optimum did not converge."""
 
     def at(self, fit: Minima) -> "Fit":
         """Return a copy with the optimum of a local fit of this trace alone."""
         misfit, converged = float(fit.misfit[0]), bool(fit.converged[0])
-        return self.replaced(np.exp(fit.x[0]), misfit, converged=converged)
-
-    def replaced(self, parameters: Array, misfit: float, *, converged: bool) -> "Fit":
-        """Return a copy with other parameters and misfit, in its last row of history as well."""
-        history = self.history
-        best_misfit, best_parameters = history.best_misfit.copy(), history.best_parameters.copy()
-        best_misfit[-1], best_parameters[-1] = misfit, parameters
-        return replace(
-            self,
-            parameters=parameters,
-            misfit=misfit,
-            converged=converged,
-            history=replace(history, best_misfit=best_misfit, best_parameters=best_parameters),
-        )
+        return replace(self, parameters=np.exp(fit.x[0]), misfit=misfit, converged=converged)
 
     def in_order(self, model: SampleModel) -> "Fit":
         """Return a copy with Maxwell branches sorted by relaxation time, in its history as well."""
         way = self.history.best_parameters
         ordered = np.take_along_axis(way, model.in_order(way), axis=1)
         found = self.parameters[model.in_order(self.parameters[None])[0]]
-        return replace(
-            self, parameters=found, history=replace(self.history, best_parameters=ordered)
-        )
+        history = replace(self.history, best_parameters=ordered)
+        return replace(self, parameters=found, history=history)
 
 
 @dataclass(frozen=True)

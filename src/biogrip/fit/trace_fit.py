@@ -7,6 +7,7 @@ computed in turn, until none of them changes.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from biogrip.digits import counted, rounded
 from biogrip.fit.experiment import Experiment, pose
 from biogrip.fit.least_squares import fit_from, identify_many
 from biogrip.fit.nested_fits import deepen
-from biogrip.fit.noise_model_fit import NoiseModelLikelihood, compute_growth, outliers_of
+from biogrip.fit.noise_model_fit import NoiseModelLikelihood, growth_left, outliers_of
 from biogrip.fit.problem import Fit, Progress, TraceProblem, silent
 from biogrip.physics.noise import NoiseModel, drift_is_flow
 from biogrip.physics.simulation import simulated_response
@@ -73,8 +74,8 @@ _CONVERGED = 1e-2
 _STAYED = 0.03
 _WORTH_SAYING = 0.005
 
-Find = Callable[[TraceProblem], Fit]
-"""Function that finds the global optimum of a problem."""
+Find = Callable[[Sequence[TraceProblem]], list[Fit]]
+"""Function that finds the global optima of problems."""
 
 
 @dataclass(frozen=True)
@@ -147,8 +148,7 @@ def fit_least_squares(
     def find(problems: Sequence[TraceProblem], which: Sequence[int]) -> list[Fit]:
         of_traces = [rngs[trace] for trace in which]
         found = identify_many(problems, experiments[0].least_squares, of_traces, progress)
-        pairs = zip(problems, deepen(problems, found), strict=True)
-        return [fit.in_order(problem.residuals.model) for problem, fit in pairs]
+        return deepen(problems, found)
 
     plain = [trace for trace, experiment in enumerate(experiments) if experiment.plain]
     problems = pose([experiments[trace] for trace in plain], [traces[trace] for trace in plain])
@@ -159,25 +159,17 @@ def fit_least_squares(
     }
     for trace, experiment in enumerate(experiments):
         if trace not in found:
-
-            def find_alone(problem: TraceProblem, trace: int = trace) -> Fit:
-                return find([problem], [trace])[0]
-
-            found[trace] = _fit_in_noise(experiment, *traces[trace], find_alone)
+            alone = partial(find, which=[trace])
+            found[trace] = _fit_in_noise(experiment, *traces[trace], alone)
     return [found[trace] for trace in range(len(traces))]
 
 
 def _fit_in_noise(experiment: Experiment, time_s: Array, readings: Array, find: Find) -> TraceFit:
-    kept = np.ones(len(time_s), dtype=bool)
-    if experiment.coloured:
-        kept, plain, found = _without_outliers(experiment, time_s, readings, find)
-    else:
-        plain = experiment.of(time_s, readings)
-        found = find(plain)
+    kept, plain, found = _without_outliers(experiment, time_s, readings, find)
     time_s, readings = time_s[kept], readings[kept]
     problem, found, noise_model, errors = _in_turn(experiment, time_s, readings, plain, found)
     # Slow deviations now weigh less, so that another basin may be the deepest.
-    other = find(problem)
+    (other,) = find([problem])
     if np.float32(other.misfit) < np.float32(found.misfit):
         found = other
     along = _fitted_along(experiment, time_s)
@@ -198,18 +190,20 @@ def _fitted_along(experiment: Experiment, time_s: Array) -> str:
 def _without_outliers(
     experiment: Experiment, time_s: Array, readings: Array, find: Find
 ) -> tuple[BoolArray, TraceProblem, Fit]:
-    kept = np.ones(len(time_s), dtype=bool)
+    """Strike outliers, if the noise may have any, and fit again, until there are no more."""
+    kept, plain = np.ones(len(time_s), dtype=bool), experiment.of(time_s, readings)
     for _ in range(_ROUNDS):
-        plain = experiment.of(time_s[kept], readings[kept])
-        found = find(plain)
-        residual = plain.residuals.left(logs := np.log(found.parameters))
-        step = plain.residuals.trace.rounding
-        growth = compute_growth(residual, plain.residuals.response(logs), step)
-        struck = outliers_of(residual / growth, step)
+        (found,) = find([plain])
+        if not experiment.coloured:
+            break
+        residual = plain.residuals.left(np.log(found.parameters))
+        growth = growth_left(plain.residuals, np.log(found.parameters))
+        struck = outliers_of(residual / growth, plain.residuals.trace.rounding)
         if not struck.any():
             break
         kept[np.flatnonzero(kept)[struck]] = False
-    return kept, experiment.of(time_s[kept], readings[kept]), found
+        plain = experiment.of(time_s[kept], readings[kept])
+    return kept, plain, found
 
 
 def _in_turn(
@@ -221,11 +215,7 @@ def _in_turn(
 ) -> tuple[TraceProblem, Fit, NoiseModel | None, tuple[float, float]]:
     """Estimate the noise from the residuals and fit again with it, until the fit converges."""
     problem, noise_model = plain, None
-    logs = np.log(found.parameters)
-    residuals = plain.residuals
-    growth = compute_growth(
-        residuals.left(logs), residuals.response(logs), residuals.trace.rounding
-    )
+    growth = growth_left(plain.residuals, np.log(found.parameters))
     grows = experiment.coloured and np.ptp(growth) > 0
     for _ in range(_ROUNDS):
         start = np.log(found.parameters)

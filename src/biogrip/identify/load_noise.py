@@ -87,7 +87,7 @@ def _left(
     nuisance, rest = experiment.nuisance(time_s[some]), []
     for record in records:
         own = replace(experiment, record=record)
-        responses = without(nuisance, lag_course(own.torque, lags)(time_s[some]))
+        responses = without(nuisance, lag_course(own.torque, lags, time_s[some]))
         rest.append(fit_responses(without(nuisance, readings[some]), responses)[1])
     return rest
 

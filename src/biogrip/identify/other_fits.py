@@ -34,7 +34,7 @@ from biogrip.fit.nested_fits import (
     vanished,
     within_range,
 )
-from biogrip.fit.noise_model_fit import absorbed, compare_extremes, compute_growth
+from biogrip.fit.noise_model_fit import absorbed, compare_extremes, growth_left
 from biogrip.fit.problem import Fit, Progress, TraceProblem, silent
 from biogrip.fit.trace_fit import TraceFit, fit_least_squares
 from biogrip.identify.prepare import flow_of, for_trace
@@ -196,12 +196,9 @@ def _growth(diagnosis: Diagnosis) -> Array | None:
 
     Noise that grows by a rejected fit is its misfit.
     """
-    residuals, best = diagnosis.likelihood.problem.residuals, diagnosis.likelihood.best
     if diagnosis.status == REJECTED:
         return None
-    growth = compute_growth(
-        residuals.left(best), residuals.response(best), residuals.trace.rounding
-    )
+    growth = growth_left(diagnosis.likelihood.problem.residuals, diagnosis.likelihood.best)
     return growth if compare_extremes(growth) > levels.CLEARLY else None
 
 
@@ -230,7 +227,7 @@ def _at_own_onset(
     best = fits.near(fits.at(0.0, within_range(found.parameters, problem)))
     if best.misfit >= found.misfit:
         return found
-    return found.replaced(np.exp(best.log_parameters), best.misfit, converged=found.converged)
+    return replace(found, parameters=np.exp(best.log_parameters), misfit=best.misfit)
 
 
 _SAME_NETWORK = "liquid_drop", "zener_maxwell"

@@ -69,7 +69,7 @@ def check_recording(
     largest = float(np.abs(trace).max())
     if largest > _ABSURD * free:
         return _check_turn(recording, largest, free, None)
-    responses = lag_course(torque, _LAG_SHARES)(time_s)
+    responses = lag_course(torque, _LAG_SHARES, time_s)
     nuisance = experiment.nuisance(time_s)
     either = (amplitudes, rest), (_, mirrored) = _either_sign(trace, responses, nuisance)
     where = recording.extent(recording.read.reading_column)

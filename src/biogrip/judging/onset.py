@@ -80,7 +80,6 @@ def _estimate(
     torque, last = problem.torque, len(time_s) - 1
     shortest = float(np.min(np.diff(time_s)))
     lags = spread_lags(torque, time_s, _LAGS_A_DECADE)
-    responses = lag_course(torque, lags)
 
     def square_sums(onsets_s: Array, some: IntArray) -> list[float]:
         nuisance = nuisance_basis(time_s[some], offset=offset, drift=problem.drift)
@@ -88,7 +87,7 @@ def _estimate(
         for few in parts(len(onsets_s), max(1, _NUMBERS_AT_ONCE // (len(lags) * len(some)))):
             # All at once: one call costs more than its numbers.
             every, place = np.unique(time_s[some] - onsets_s[few, None], return_inverse=True)
-            shown, place = responses(every), place.reshape(-1, len(some))
+            shown, place = lag_course(torque, lags, every), place.reshape(-1, len(some))
             sums += [fit_responses(trace, without(nuisance, shown[:, own]))[1] for own in place]
         return sums
 

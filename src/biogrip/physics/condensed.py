@@ -19,7 +19,7 @@ References
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain, pairwise
 
@@ -46,10 +46,9 @@ _MOST_NODES_KEPT = 20_000
 
 @dataclass(frozen=True)
 class _Piece:
-    """Readings from `first` up to `stop`, and their nodes."""
+    """A stretch of the readings, and its nodes."""
 
-    first: int
-    stop: int
+    readings: slice
     nodes_s: Array
     """Times of the nodes, (n_nodes,)."""
     basis: Array | None = None
@@ -65,12 +64,12 @@ class DenseSamples:
     if `dense` may nodes replace readings; otherwise each reading is a node.
     """
 
-    def __init__(self, course: Course, time_s: Array, *, dense: bool = True) -> None:
+    def __init__(self, course: Course, time_s: Array, *, dense: bool) -> None:
         self._all_s = time_s
         starts = course.changes_s
         self._starts_s = np.append(-np.inf, starts)
         bounds = np.unique(np.concatenate(([0], time_s.searchsorted(starts), [len(time_s)])))
-        self._pieces = [_Piece(0, len(time_s), time_s)]
+        self._pieces = [_Piece(slice(len(time_s)), time_s)]
         if dense:
             self._pieces = [piece for ends in pairwise(bounds) for piece in self._divided(*ends)]
         self.time_s = np.concatenate([piece.nodes_s for piece in self._pieces])
@@ -91,7 +90,7 @@ class DenseSamples:
         rows: list[Array] = []
         rest = 0.0
         for piece in self._pieces:
-            own = samples[piece.first : piece.stop]
+            own = samples[piece.readings]
             if piece.basis is None:
                 rows.append(own)
             else:
@@ -101,19 +100,20 @@ class DenseSamples:
 
     def _divided(self, first: int, stop: int) -> Iterator[_Piece]:
         """Halve pieces that are not smooth, or not dense all over, down to few readings."""
+        here = slice(first, stop)
         if stop - first < _FEWEST_READINGS:
-            yield _Piece(first, stop, self._all_s[first:stop])
+            yield _Piece(here, self._all_s[here])
             return
         start, end = self._all_s[first], self._all_s[stop - 1]
         elapsed = start - self._starts_s[self._starts_s.searchsorted(start, side="right") - 1]
         if end - start <= elapsed:
-            place = (2 * self._all_s[first:stop] - start - end) / (end - start)
+            place = (2 * self._all_s[here] - start - end) / (end - start)
             basis, triangle = np.linalg.qr(legendre.legvander(place, _DEGREE))
             if np.linalg.cond(triangle / np.linalg.norm(triangle, axis=0)) <= _LARGEST_CONDITION:
                 nodes_s = 0.5 * (start + end) + 0.5 * (end - start) * _PLACES
-                yield _Piece(first, stop, nodes_s, basis, _TO_SERIES.T @ triangle.T)
+                yield _Piece(here, nodes_s, basis, _TO_SERIES.T @ triangle.T)
                 return
-        half = first + int(np.searchsorted(self._all_s[first:stop], 0.5 * (start + end)))
+        half = first + int(np.searchsorted(self._all_s[here], 0.5 * (start + end)))
         yield from self._divided(first, half)
         yield from self._divided(half, stop)
 
@@ -135,10 +135,6 @@ class Condensed:
     def nuisance(self) -> Array:
         """Functions that are projected out, (n_functions, n_samples)."""
         return self.functions if self.whitening is None else self.whitening.nuisance
-
-    def later(self, change_s: float) -> "Condensed":
-        """Return rows for a protocol that starts later by some s; noise and nuisance stay."""
-        return replace(self, all_s=self.course.snapped(self.all_s - change_s))
 
     def cleared(self, rows: Array) -> Array:
         """Project nuisance out of functions of time, (..., n_samples), and whiten noise."""
@@ -190,7 +186,7 @@ class Condensed:
             return np.empty(0), self._triangle(np.zeros_like(self.all_s))[:, :-1]
         dense, modes = self._dense, self._modes
         given = modes.rates[None], self.course, dense.time_s
-        responses = modes.scale[:, None] * mode_responses(*given, slopes=False)[0][0]
+        responses = modes.scale[:, None] * mode_responses(*given)[0]
         responses = dense.rows_of_values(responses)
         if self.whitening is not None:
             responses = self.whitening(responses)

@@ -184,7 +184,9 @@ def _beside(network: Network, k_p: Array | float = 0.0, c_p: Array | float = 0.0
 
 @cache
 def on_clock(model: SampleModel, unit_s: float) -> SampleModel:
-    """Return a power law whose ladders are springpots from 1e-5 to 1e5 of a unit of time."""
+    """Return the model with ladders that are springpots from 1e-5 to 1e5 of a unit of time."""
+    if not model.power_law or unit_s == 1:
+        return model
     kinds = [parameter.kind for parameter in model.parameters]
 
     def network(parameters: ArrayLike) -> Network:

@@ -46,7 +46,8 @@ def make_misfits(residuals: Sequence[Residuals]) -> Misfits:
     the paper's: of a sample with one Maxwell branch between equal arms under steps of a torque,
     sampled uniformly from the start on, with a reading at each step, in white noise alone.
     """
-    if all(map(residuals[0].shares_responses, residuals)) and (series := _series_of(residuals)):
+    alike = len({each.of_responses for each in residuals}) == 1
+    if alike and (series := _series_of(residuals)):
         return series.of_each
     misfits = [make_misfit(each) for each in residuals]
 
@@ -91,7 +92,7 @@ class SeriesMisfit:
         interval_s: float,
         readings: Array,
     ) -> None:
-        self._simulated = (gripper, model, course, interval_s)
+        self._simulated = gripper, model, interval_s
         self._traces = np.atleast_2d(readings)
         self._samples = self._traces.shape[1]
         # Change of the torque at the start of each phase, and level after it.
@@ -128,7 +129,7 @@ class SeriesMisfit:
 
     def _of_some(self, parameters: Array, traces: IntArray) -> Array:
         shape = parameters.shape[:2]
-        gripper, model, _, interval_s = self._simulated
+        gripper, model, interval_s = self._simulated
         network = model.network(parameters.reshape(-1, parameters.shape[2]))
         static, rates, weights = two_modes(gripper.left, gripper.lever_m, network)
         rates *= interval_s
@@ -136,7 +137,7 @@ class SeriesMisfit:
         square = self._model_square_sums(static, rates, weights)
         square += self._square_sums.take(trace)
         product = static * self._projections_of_constant.take(trace)
-        product += _sum(weights * self.projections.of(trace, rates))
+        product += _sum(weights * self.projections(trace, rates))
         product *= 2
         square -= product
         np.maximum(square, 0, out=square)
@@ -145,7 +146,7 @@ class SeriesMisfit:
 
     @cached_property
     def _projections_of_constant(self) -> Array:
-        return self.projections(np.zeros(1))[:, 0]
+        return self.projections(np.arange(len(self._traces)), np.zeros(1))
 
     def _model_square_sums(self, static: Array, rates: Array, weights: Array) -> Array:
         """Sum squared responses over readings, (n,), as geometric series without cancellation."""

@@ -63,42 +63,14 @@ def generalized_maxwell(*columns: Array) -> Network:
     return Network(k_p=columns[n], c_p=columns[-1], k=k.T, c=c.T)
 
 
-@of_columns
-def liquid_drop(k: Array, k_p: Array, c: Array) -> Network:
-    """Maxwell liquid drop with membrane stiffness, Figure 5 (1); columns k, k_p, c."""
-    return Network(k_p=k_p, c_p=np.zeros_like(k_p), k=k[:, None], c=c[:, None])
-
-
-@of_columns
-def kelvin_voigt(k_p: Array, c_p: Array) -> Network:
-    """Kelvin-Voigt solid, a spring beside a damper; columns k_p, c_p."""
-    none = np.zeros((len(k_p), 0))
+def _without_branches(k_p: Array, c_p: Array) -> Network:
+    none = np.zeros((len(c_p), 0))
     return Network(k_p=k_p, c_p=c_p, k=none, c=none)
 
 
-@of_columns
-def damper(c_p: Array) -> Network:
-    """Bare damper, a Newtonian liquid; column c_p."""
-    none = np.zeros((len(c_p), 0))
-    return Network(k_p=np.zeros_like(c_p), c_p=c_p, k=none, c=none)
-
-
-@of_columns
-def maxwell(k: Array, c: Array) -> Network:
-    """Maxwell liquid, a spring and a damper in series; columns k, c."""
-    none = np.zeros_like(k)
-    return Network(k_p=none, c_p=none, k=k[:, None], c=c[:, None])
-
-
-@of_columns
-def zener_kelvin(k_s: Array, k_v: Array, c_v: Array) -> Network:
-    """Zener solid (standard linear solid) in Kelvin's form; columns k_s, k_v, c_v.
-
-    In series with k_s are k_v and c_v, side by side. Its Maxwell form has k_p = k_s k_v/(k_s +
-    k_v), k = k_s^2/(k_s + k_v) and c = c_v [k_s/(k_s + k_v)]^2.
-    """
-    k, k_p, c = _to_maxwell(k_s, k_v, c_v)
-    return Network(k_p=k_p, c_p=np.zeros_like(k_s), k=k[:, None], c=c[:, None])
+def _one_branch(k: Array, k_p: Array, c: Array) -> Network:
+    """Return a Maxwell branch beside a spring, Figure 5 (1): a drop in its membrane."""
+    return Network(k_p=k_p, c_p=np.zeros_like(k), k=k[:, None], c=c[:, None])
 
 
 @of_columns
@@ -137,7 +109,10 @@ def _to_kelvin(k: Array, k_p: Array, c: Array) -> tuple[Array, ...]:
 
 
 def _to_maxwell(k_s: Array, k_v: Array, c_v: Array) -> tuple[Array, ...]:
-    """Zener solid: from Kelvin's form to Maxwell's."""
+    """Zener solid: from Kelvin's form, k_s before k_v and c_v side by side, to Maxwell's.
+
+    This has k_p = k_s k_v/(k_s + k_v), k = k_s^2/(k_s + k_v) and c = c_v [k_s/(k_s + k_v)]^2.
+    """
     share = 1 / (1 + k_v / k_s)
     return share * k_s, share * k_v, share**2 * c_v
 
@@ -189,7 +164,6 @@ GENERALIZED_MAXWELL = SampleModel(
         "liquid_drop": lambda k, k_p, c: (k, k_p, c, 0.0),
         "kelvin_voigt": lambda k_p, c_p: (0.0, k_p, 0.0, c_p),
     },
-    branched=_with_branches,
 )
 MAXWELL_MODELS = (
     GENERALIZED_MAXWELL,
@@ -197,7 +171,7 @@ MAXWELL_MODELS = (
         "liquid_drop",
         "Maxwell liquid drop with membrane stiffness",
         (K, K_P, C),
-        liquid_drop,
+        of_columns(_one_branch),
         example=(9.5, 0.3, 10.0),
         contains={"zener_maxwell": _same, **_IN_A_DROP},
     ),
@@ -205,14 +179,14 @@ MAXWELL_MODELS = (
         "damper",
         "bare damper",
         (replace(C_P, meaning="damper", may_vanish=False),),
-        damper,
+        of_columns(lambda c_p: _without_branches(0 * c_p, c_p)),
         example=(10.0,),
     ),
     SampleModel(
         "kelvin_voigt",
         "Kelvin-Voigt solid",
         (K_P, C_P),
-        kelvin_voigt,
+        of_columns(_without_branches),
         example=(0.3, 10.0),
         contains={"damper": lambda c_p: (0.0, c_p)},
     ),
@@ -220,7 +194,7 @@ MAXWELL_MODELS = (
         "maxwell",
         "Maxwell liquid",
         (K, C),
-        maxwell,
+        of_columns(lambda k, c: _one_branch(k, 0 * k, c)),
         example=(2.0, 50.0),
         contains={"damper": lambda c_p: (inf, c_p)},
     ),
@@ -228,7 +202,7 @@ MAXWELL_MODELS = (
         "zener_maxwell",
         "Zener solid, Maxwell form",
         (K, replace(K_P, meaning="parallel spring"), C),
-        liquid_drop,
+        of_columns(_one_branch),
         example=(2.0, 1.0, 50.0),
         contains={"liquid_drop": _same, **_IN_A_DROP},
     ),
@@ -236,7 +210,7 @@ MAXWELL_MODELS = (
         "zener_kelvin",
         "Zener solid, Kelvin form",
         (K_S, K_V, C_V),
-        zener_kelvin,
+        of_columns(lambda *elements: _one_branch(*_to_maxwell(*elements))),
         example=(3.0, 2.0, 40.0),
         contains={
             "liquid_drop": _to_kelvin,
@@ -284,9 +258,9 @@ class Sample:
         """The constitutive model."""
         model = MODELS[self.name]
         if self.branches != 1:
-            if model.branched is None:
+            if model is not GENERALIZED_MAXWELL:
                 raise ValueError(f"{self.name} has no number of branches")
-            model = model.branched(self.branches)
+            model = _with_branches(self.branches)
         return model if self.stiffness == "N/m" else in_units(model, self.stiffness)
 
     @property
@@ -298,13 +272,8 @@ class Sample:
 CANDIDATES: dict[str, Sample] = {
     sample.candidate: sample
     for sample in (
-        *(Sample(name) for name in MODELS),
-        *(
-            Sample(name, branches)
-            for name, model in MODELS.items()
-            if model.branched
-            for branches in range(2, MOST_BRANCHES + 1)
-        ),
+        *map(Sample, MODELS),
+        *(Sample(GENERALIZED_MAXWELL.name, more) for more in range(2, MOST_BRANCHES + 1)),
     )
 }
 """Models that a trace may be fitted with, by name with the number of branches."""
@@ -324,15 +293,10 @@ def contained(candidate: str) -> Mapping[str, tuple[Turned, ...]]:
     return found
 
 
-def contained_in(candidate: str, others: Collection[str]) -> list[str]:
-    """Return the names of those candidates among `others` that are nested in one."""
-    return [name for name in contained(candidate) if name in others]
-
-
 def different_in(candidate: str, others: Collection[str]) -> list[str]:
-    """Return the same names, with only one of models that are equivalent in other parameters."""
+    """Return those of `others` that are nested in one, and one of models that are equivalent."""
     found: list[str] = []
-    for name in contained_in(candidate, others):
+    for name in filter(others.__contains__, contained(candidate)):
         if not any(name in contained(other) and other in contained(name) for other in found):
             found.append(name)
     return found

@@ -25,7 +25,7 @@ References
 .. [3] J. D. Ferry, Viscoelastic Properties of Polymers, Wiley, 1980, chapter 3.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -65,16 +65,13 @@ def linear_responses(
     course: Course,
     time_s: Array,
     parameters: Array,
-    *,
-    slopes: bool = True,
 ) -> Array:
     """Compute what is read in the linear model, corrected eqs. (4)-(6), and d/d log p of it.
 
     Times, (n_times,), ascend; parameters, (n, n_parameters), are positive. Returns readings and
-    their derivatives, (n, 1 + n_parameters, n_times); without `slopes`, (n, 1, n_times).
+    their derivatives, (n, 1 + n_parameters, n_times).
     """
-    modes = compute_modes(gripper, model, course, parameters, slopes=slopes)
-    return sum_of_modes(modes, course, time_s)
+    return sum_of_modes(compute_modes(gripper, model, course, parameters), course, time_s)
 
 
 def sum_of_modes(modes: Modes, course: Course, time_s: Array) -> Array:
@@ -113,7 +110,7 @@ def compute_modes(
         *of_modes, d_rates, d_weights = _between_arms(gripper, network, count)
         of_slopes = (of.transpose(2, 0, 1) for of in (d_rates, d_weights))
         return Modes(*map(np.ascontiguousarray, (*(of.T for of in of_modes), *of_slopes)))
-    both = [of.reshape(count + 1, -1, of.shape[1]) for of in _branches(network)]
+    both = [of.reshape(count + 1, -1, of.shape[1]) for of in elements_of(network)]
     rates, weights = (np.ascontiguousarray(of[0].real) for of in both)
     return Modes(rates, weights, *((of[1:].imag / _COMPLEX_STEP).swapaxes(0, 1) for of in both))
 
@@ -167,15 +164,7 @@ def _between_arms(
     return -x, weights, -moved, weight_slopes
 
 
-def relaxation(network: Network, course: Course, time_s: Array) -> Array:
-    """Compute the load on samples that a protocol deforms, (n, n_times)."""
-    rates, weights = _branches(network)
-    decay, _ = mode_responses(rates, course, time_s, slopes=False)
-    load: Array = (weights[:, None] @ decay)[:, 0]
-    return load
-
-
-def _branches(network: Network) -> tuple[NDArray[Any], NDArray[Any]]:
+def elements_of(network: Network) -> tuple[NDArray[Any], NDArray[Any]]:
     """Return rates and stiffnesses of elements side by side, (n, n_modes); of bare ones last."""
     bare = np.stack((network.k_p, _RATE_OF_A_DAMPER * network.c_p), axis=1)
     fixed = np.broadcast_to([0.0, -_RATE_OF_A_DAMPER], bare.shape)
@@ -186,41 +175,37 @@ def _branches(network: Network) -> tuple[NDArray[Any], NDArray[Any]]:
     return np.concatenate((rates, fixed), axis=1), np.concatenate((weights, bare), axis=1)
 
 
-def lag_course(course: Course, shares: Sequence[float]) -> Callable[[Array], Array]:
-    """Return a function of ascending times for loads that lag behind, (n_lags, n_times).
+def lag_course(course: Course, shares: Sequence[float], time_s: Array) -> Array:
+    """Return loads that lag behind, (n_lags, n_times), at ascending times.
 
     Of a deformation, they are the forces of springs that forget it with these relaxation times,
     given as shares of the protocol's duration.
     """
     rates, sign = -1 / (course.end_s * np.array(shares)), 1.0 if course.deforms else -1.0
-
-    def lagged(time_s: Array) -> Array:
-        lags: Array = sign * mode_responses(rates[None], course, time_s, slopes=False)[0][0]
-        return lags
-
-    return lagged
+    lags: Array = sign * mode_responses(rates[None], course, time_s)[0]
+    return lags
 
 
-def mode_responses(
-    rates: Array, course: Course, time_s: Array, *, slopes: bool = True
-) -> tuple[Array, Array]:
-    """Compute responses of modes of unit weight, or of branches of unit stiffness, and dg/dr.
+def mode_responses(rates: Array, course: Course, time_s: Array) -> Array:
+    """Compute responses of modes of unit weight, or of branches of unit stiffness.
 
     Rates in 1/s, (n, n_modes), are real, negative or zero. Times, (n_times,), ascend; at the very
-    instant of a step is what precedes it, and before the protocol nothing responds. Both results
-    are (n, n_modes, n_times), in units of what is controlled, and those times s. Without `slopes`
-    the responses are returned in their place.
+    instant of a step is what precedes it, and before the protocol nothing responds. Responses are
+    (n, n_modes, n_times), in units of what is controlled.
     """
-    both = np.zeros((1 + slopes, *rates.shape, len(time_s)))
-    for here, found in responses_in_turn(rates, course, time_s, slopes=slopes):
-        both[..., here] = found
-    return both[0], both[-1]
+    responses = np.zeros((*rates.shape, len(time_s)))
+    for here, (found,) in responses_in_turn(rates, course, time_s, slopes=False):
+        responses[..., here] = found
+    return responses
 
 
 def responses_in_turn(
     rates: Array, course: Course, time_s: Array, *, slopes: bool = True
 ) -> Iterator[tuple[slice, Array]]:
-    """Yield parts of the times after the start, and what `mode_responses` finds there, stacked."""
+    """Yield parts of the times after the start, and responses there stacked on dg/dr.
+
+    Responses are those of `mode_responses`; without `slopes` there are no derivatives.
+    """
     if course.sweeps:
         yield slice(None), moduli_of_modes(rates, time_s)[: 1 + slopes]
         return

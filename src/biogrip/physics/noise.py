@@ -215,16 +215,10 @@ def _words(name: str) -> tuple[int, ...]:
     return tuple(int.from_bytes(digest[i : i + 4], "big") for i in range(0, 16, 4))
 
 
-# Least squared norm of a function that is projected out completely, up to rounding.
-_LEAST_NORM = 1 - 1e-9
-
-
 def nuisance_basis(time_s: Array, *, offset: bool, drift: bool) -> Array:
     """Return orthonormal functions of time, (n_functions, n_times), that span offset and drift."""
     functions = [np.ones_like(time_s)] * offset + [time_s] * drift
-    if not functions:
-        return np.zeros((0, len(time_s)))
-    return np.linalg.qr(np.stack(functions, axis=1))[0].T
+    return np.linalg.qr(np.reshape(functions, (-1, len(time_s))).T)[0].T
 
 
 def without(basis: Array, rows: Array) -> Array:
@@ -254,11 +248,6 @@ def with_uncertain(basis: Array, functions: Array) -> Array:
     return np.vstack((basis, np.sqrt(shares)[:, None] * directions))
 
 
-def taken_out(basis: Array) -> int:
-    """Count the functions of a basis that are projected out completely."""
-    return int(np.count_nonzero(np.sum(np.square(basis), axis=1) > _LEAST_NORM))
-
-
 # A lag of so many protocols is an integral of the load.
 _LAG = 1e6
 # Share of a drift's variance that must be no flow: below it, lines differ by less than a tenth.
@@ -274,7 +263,7 @@ def drift_is_flow(course: Course, time_s: Array) -> bool:
     if course.deforms:
         return False
     constant = nuisance_basis(time_s, offset=True, drift=False)
-    flows = without(constant, _LAG * lag_course(course, (_LAG,))(time_s))
+    flows = without(constant, _LAG * lag_course(course, (_LAG,), time_s))
     drift = without(constant, time_s / course.end_s)
     basis = np.linalg.qr(flows.T)[0].T
     return bool(np.sum(without(basis, drift) ** 2) < _LEAST_SHARE_OF_DRIFT * np.sum(drift**2))
@@ -372,13 +361,11 @@ class Whitening:
         from celerite2 import driver
 
         flicker = flicker_rates(time_s)
-        rates = np.append(1 / noise_model.time_s, flicker)
-        shares = np.append(
-            noise_model.ar1, np.full(len(flicker), noise_model.flicker / len(flicker))
-        )
+        rates = np.concatenate(([1 / noise_model.time_s], flicker, [0.0]))
+        of_flicker = np.full(len(flicker), noise_model.flicker / len(flicker))
+        shares = np.concatenate(([noise_model.ar1], of_flicker, [noise_model.walk]))
         self._solve = driver.solve_lower
         walked = (time_s - time_s[0]) / np.mean(time_s - time_s[0])
-        rates, shares = np.append(rates, 0.0), np.append(shares, noise_model.walk)
         self._time_s, self._rates = np.ascontiguousarray(time_s, float), rates
         self._left = np.tile(shares, (len(time_s), 1))
         right = np.ones_like(self._left)

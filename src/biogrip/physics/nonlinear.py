@@ -111,11 +111,10 @@ def correction(
     before_jumps = np.minimum(nodes, np.nextafter(edges[1:, None], 0)).ravel()
     shape = (len(network.k_p), len(arms), *nodes.shape)
     b_0 = gripper.lever_m
-    linear, linear_rate = np.empty(shape), np.empty(shape)
-    for arm in range(len(arms)):
-        phi = superpose(response, torque, nodes.ravel(), arm)
-        rate = superpose(response, torque, before_jumps, arm, rate=True)
-        linear[:, arm], linear_rate[:, arm] = (of.reshape(-1, *nodes.shape) for of in (phi, rate))
+    every, given = range(len(arms)), (response, torque)
+    turned = [superpose(*given, nodes.ravel(), arm) for arm in every]
+    rates = [superpose(*given, before_jumps, arm, rate=True) for arm in every]
+    linear, linear_rate = (np.stack(of, axis=1).reshape(shape) for of in (turned, rates))
     tau = evaluate(torque, before_jumps).reshape(nodes.shape)
     times = np.ones(shape[0]) if factors is None else factors
     linear, linear_rate, tau = (

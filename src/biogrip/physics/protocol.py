@@ -194,25 +194,23 @@ def join_phases(phases: tuple[Phase, ...], *, deforms: bool = False) -> Course:
     durations = np.array([phase.duration_s for phase in phases])
     ends = np.cumsum(durations)
     starts = np.concatenate(([0.0], ends[:-1]))
-    # Level, slope and curvature at the start of each phase, and at its end.
+    # Level, slope and curvature at the start of each phase, less those before it.
     changes = np.array([[phase.level, phase.slope, phase.curvature] for phase in phases])
-    level, slope, curvature = changes.T
-    reached = (
-        level + slope * durations + curvature * durations**2 / 2,
-        slope + curvature * durations,
-        curvature,
-    )
     least = _LEAST_STEP * np.max(np.abs(changes), axis=0)
-    changes[1:] -= np.stack(reached, axis=1)[:-1]
+    changes[1:] -= np.stack(_carried(changes.T, durations), axis=1)[:-1]
     # A ramp that ends where the next one begins makes no step, but for rounding, and one that goes
     # on at the same rate no jump of the rate.
     changes[1:][np.abs(changes[1:]) < least] = 0.0
     within = changes.copy()
     for k, gap in enumerate(np.diff(starts)):
-        level, slope, curvature = within[k]
-        carried = level + slope * gap + curvature * gap**2 / 2, slope + curvature * gap
-        within[k + 1] += (*carried, curvature)
+        within[k + 1] += _carried(within[k], gap)
     return Course(starts, changes, within, float(ends[-1]), deforms)
+
+
+def _carried(orders: Array, t: Array) -> tuple[Array, Array, Array]:
+    """Return level, slope and curvature after a time."""
+    level, slope, curvature = orders
+    return level + slope * t + curvature * t**2 / 2, slope + curvature * t, curvature
 
 
 def evaluate(course: Course, time_s: ArrayLike) -> Array:

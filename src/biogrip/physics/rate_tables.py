@@ -81,12 +81,7 @@ class DecayTable:
         self._powers = np.ascontiguousarray(np.moveaxis(powers, 2, 0))
         self._end = np.nextafter(powers.shape[1], 0)
 
-    def __call__(self, rates: Array) -> Array:
-        """Return the sums at rates of any shape, shape (n_sums, ...)."""
-        every = np.arange(self._powers.shape[1]).reshape(-1, *np.ones(rates.ndim, dtype=int))
-        return self.of(every, rates)
-
-    def of(self, which: IntArray, rates: Array) -> Array:
+    def __call__(self, which: IntArray, rates: Array) -> Array:
         """Return sums of some indices, each at rates of its own; both broadcast."""
         place = np.fmin(np.log(1 - self._longest * rates) / (_WIDTH / _SHORTER), self._end)
         piece = place.astype(np.intp)
@@ -112,7 +107,7 @@ class ModeRows:
     """
 
     def __init__(self, modes: "SpanningModes", rows: Array) -> None:
-        self._end_s, self._deforms, self._decayed = modes.end_s, modes.deforms, modes.decayed
+        self._modes = modes
         powers = modes.powers.reshape(len(rows), -1).T @ rows
         # (n_pieces + 1, degree + 1, n_rows).
         self._table = powers.reshape(-1, len(_ORDERS), rows.shape[1])
@@ -121,25 +116,26 @@ class ModeRows:
     def __call__(self, modes: Modes) -> Array:
         """Return rows of responses with derivatives, (n, 1 + n_parameters, n_rows)."""
         count, parameters, n_modes = modes.rate_slopes.shape
-        scaled, width = -self._end_s * modes.rates, _WIDTH / _SHORTER_OF_ROWS
+        end_s, deforms, decayed = self._modes.end_s, self._modes.deforms, self._modes.decayed
+        scaled, width = -end_s * modes.rates, _WIDTH / _SHORTER_OF_ROWS
         u = np.log1p(scaled) / width
         lasts = u < self._last
         piece = np.where(lasts, u, self._last).astype(np.intp)
-        beyond = self._decayed / np.maximum(scaled, self._decayed)
+        beyond = decayed / np.maximum(scaled, decayed)
         powers = _powers(np.where(lasts, u - piece, beyond))
-        scale = _divisor(scaled, self._decayed, self._deforms)
+        scale = _divisor(scaled, decayed, deforms)
         amplitudes = modes.weights * scale
         mixed = np.empty((count, 1 + parameters, n_modes, len(_ORDERS)))
         np.multiply(amplitudes[..., None], powers, out=mixed[:, 0])
         if parameters:
             # The divisor, and the place, with their derivatives by the log-parameters.
-            scaled_slopes = -self._end_s * modes.rate_slopes
+            scaled_slopes = -end_s * modes.rate_slopes
             place_slopes = np.where(
-                lasts, 1 / (width * (1 + scaled)), -beyond / np.maximum(scaled, self._decayed)
+                lasts, 1 / (width * (1 + scaled)), -beyond / np.maximum(scaled, decayed)
             )
             place_slopes = place_slopes[:, None] * scaled_slopes
             scale_slopes = np.where(lasts, 1.0, 0.0)[:, None] * scaled_slopes
-            if self._deforms:
+            if deforms:
                 # What a fast mode has not forgotten falls with its rate.
                 scale_slopes = -(scale * scale)[:, None] * scaled_slopes
             amplitude_slopes = modes.weight_slopes * scale[:, None]

@@ -1,6 +1,6 @@
 """Residuals of a model against one trace, with exact derivatives by the log-parameters."""
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
 
@@ -11,10 +11,18 @@ from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import Instrument
 from biogrip.physics.modes import compute_modes, linear_responses, sum_of_modes
-from biogrip.physics.noise import estimate_noise, measure_rounding, taken_out
+from biogrip.physics.noise import estimate_noise, measure_rounding
 from biogrip.physics.protocol import Course
 from biogrip.physics.sample_model import Network, SampleModel
-from biogrip.physics.simulation import Grip, Ring, compute_grip, find_ring
+from biogrip.physics.simulation import (
+    VISIBLE,
+    Grip,
+    Ring,
+    compute_grip,
+    elapsed_s,
+    ring,
+    ringing_s,
+)
 
 # Most numbers in the rows that are formed at once.
 _NUMBERS_AT_ONCE = 100_000
@@ -26,16 +34,19 @@ _MOST_NUMBERS = 100_000
 class Trace:
     """A trace, and the condensed rows that stand for it."""
 
-    time_s: Array
-    """Ascending sampling times, (n_samples,)."""
     readings: Array
     """What was read, (n_samples,)."""
     condensed: Condensed
-    """Rows for the protocol and these times; specify nuisance functions and noise model."""
+    """Rows for the protocol and the times; specify nuisance functions and noise model."""
     known_noise: float | None = None
     """Standard deviation of the noise; None to estimate it from neighbouring readings."""
     known_scatter: float | None = None
     """That of neighbouring readings, if it is known; None to estimate it."""
+
+    @property
+    def time_s(self) -> Array:
+        """Ascending sampling times, (n_samples,)."""
+        return self.condensed.all_s
 
     @cached_property
     def cleared(self) -> Array:
@@ -46,11 +57,6 @@ class Trace:
     def rounding(self) -> float:
         """Step that the readings are multiples of, or zero."""
         return measure_rounding(self.readings)
-
-    @cached_property
-    def noise_sd(self) -> float:
-        """Standard deviation of the noise, known or estimated."""
-        return self.scatter if self.known_noise is None else self.known_noise
 
     @cached_property
     def scatter(self) -> float:
@@ -91,7 +97,9 @@ class Residuals:
     @property
     def free(self) -> int:
         """Number of readings minus that of nuisance functions of free amplitude."""
-        return self.samples - taken_out(self.trace.condensed.nuisance)
+        norms = np.sum(np.square(self.trace.condensed.nuisance), axis=1)
+        # Those of random amplitude are shorter: they are projected out in part.
+        return self.samples - int(np.count_nonzero(norms > 1 - 1e-9))
 
     @property
     def duration_s(self) -> float:
@@ -101,8 +109,9 @@ class Residuals:
 
     @property
     def noise_scale(self) -> float:
-        """Standard deviation of the noise."""
-        return self.trace.noise_sd
+        """Standard deviation of the noise, known or estimated."""
+        trace = self.trace
+        return trace.scatter if trace.known_noise is None else trace.known_noise
 
     @cached_property
     def peak(self) -> float:
@@ -115,22 +124,22 @@ class Residuals:
         return self.trace.condensed.whitening is not None
 
     def later(self, change_s: float) -> "Residuals":
-        """Return the residuals of the same trace for a protocol that starts later by some s."""
-        trace = self.trace
-        condensed = trace.condensed.later(change_s)
-        moved = replace(
-            trace, time_s=condensed.all_s, condensed=condensed, known_scatter=trace.scatter
-        )
-        return replace(self, trace=moved)
+        """Return the residuals of the same trace for a protocol that starts later by some s.
 
-    def shares_responses(self, other: "Residuals") -> bool:
-        """Return True if `other` differs in its trace and noise only, so that responses agree."""
-        same_rows = self.trace.condensed is other.trace.condensed
-        return same_rows and (self.gripper, self.model) == (other.gripper, other.model)
+        Noise and nuisance stay.
+        """
+        trace, earlier_s = self.trace, self.course.snapped(self.trace.time_s - change_s)
+        condensed = replace(trace.condensed, all_s=earlier_s)
+        return replace(self, trace=replace(trace, condensed=condensed, known_scatter=trace.scatter))
+
+    @property
+    def of_responses(self) -> Hashable:
+        """What responses depend on: with equal ones, residuals differ in trace and noise alone."""
+        return self.trace.condensed, self.gripper, self.model
 
     def __call__(self, log_parameters: Array) -> tuple[Array, Array]:
         """Return residuals, (n_samples,), and derivatives, (n_parameters, n_samples)."""
-        rows = self._simulated(log_parameters[None], self.trace.time_s)[0]
+        rows = self._simulated(log_parameters)
         cleared = self.trace.condensed.cleared
         return cleared(rows[0]) - self.trace.cleared, cleared(rows[1:])
 
@@ -141,7 +150,8 @@ class Residuals:
 
     def response(self, log_parameters: Array) -> Array:
         """Return the simulated response, neither cleared nor whitened, (n_samples,)."""
-        return self._simulated(log_parameters[None], self.trace.time_s)[0, 0]
+        response: Array = self._simulated(log_parameters)[0]
+        return response
 
     def gradients(
         self, log_parameters: Array, others: Sequence["Residuals"]
@@ -193,11 +203,30 @@ class Residuals:
         return compute_grip(self.gripper, network, self.course, nonlinear=False)
 
     def ring(self, network: Network, noise_sd: float) -> Ring | None:
-        """Return what noise of this size lets be seen of the arms' ringing on a sample, if any."""
-        trace = self.trace
-        given = self.gripper, network, self.course, trace.time_s
-        return find_ring(*given, lambda change: trace.condensed.cleared(change) / noise_sd)
+        """Return what noise of this size lets be seen of the arms' ringing on a sample, if any.
 
-    def _simulated(self, log_parameters: Array, time_s: Array) -> Array:
-        parameters = np.exp(log_parameters)
-        return linear_responses(self.gripper, self.model, self.course, time_s, parameters)
+        A parallel damper ends a ring. It only counts if it is seen when the ring is over, too: what
+        readings of a ring tell of it, without inertia, is the ring's.
+        """
+        gripper, time_s = self.gripper, self.trace.time_s
+        if not gripper.has_inertia:
+            return None
+        springs = network.k_p + network.k.sum(axis=1) + gripper.jaw_stiffness_N_per_m
+        is_seen = network.c_p > ringing_s(gripper) * springs
+        network = replace(network, c_p=np.where(is_seen, network.c_p, 0.0))
+        elapsed = elapsed_s(self.course, time_s)
+        ringing = elapsed <= ringing_s(gripper)
+        change = np.zeros(len(time_s))
+        change[ringing] = ring(gripper, network, self.course, time_s[ringing])[0]
+        shown = self.trace.condensed.cleared(change) / noise_sd
+        latest_first = np.argsort(-elapsed, kind="stable")
+        norms = np.sqrt(np.cumsum(shown[latest_first] ** 2))
+        visible = np.flatnonzero(norms > VISIBLE)
+        if not len(visible):
+            return None
+        return Ring(float(np.max(np.abs(shown))), float(elapsed[latest_first[visible[0]]]))
+
+    def _simulated(self, log_parameters: Array) -> Array:
+        given = self.gripper, self.model, self.course, self.trace.time_s
+        rows: Array = linear_responses(*given, np.exp(log_parameters[None]))[0]
+        return rows

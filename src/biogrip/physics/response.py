@@ -48,14 +48,12 @@ _LEAST_DIFFERENCE = 1e-30
 
 @dataclass(frozen=True)
 class StepResponse:
-    """Response of n samples to a unit step of the load, as a constant plus exponentials.
+    """Response of n samples to a unit step of the load: exponentials beside a constant.
 
     A unit torque on both arms at time 0 turns arm a (`LEFT`, `RIGHT`) by
-    ``static[:, a] + sum_j weights[:, a, j] exp(rates[:, j] t)``.
+    ``sum_j weights[:, a, j] (exp(rates[:, j] t) - 1)``.
     """
 
-    static: Array
-    """Final rotation in rad per N m, (n, n_arms)."""
     rates: NDArray[Any]
     """Exponents in 1/s, (n, n_modes), real without inertia, complex with it."""
     weights: NDArray[Any]
@@ -74,7 +72,6 @@ def step_response(
     arms = Arms(gripper)
     impedance = arms.with_sample(network)
     zeros = impedance.zeros()
-    static = arms.force_at_rest(network) if force else arms.rotations_at_rest(network)
     if inertia:
         ringing = Ringing(gripper, network, zeros)
         rates: NDArray[Any] = ringing.rates
@@ -83,10 +80,7 @@ def step_response(
         rates = -zeros.values.T
         numerators = arms.force(zeros) if force else arms.rotations(zeros)[0]
         weights = -numerators / impedance.steepness(zeros)
-    static, rates, weights = (
-        np.ascontiguousarray(of) for of in (static.T, rates, np.moveaxis(weights, -1, 0))
-    )
-    return StepResponse(static, rates, weights)
+    return StepResponse(*map(np.ascontiguousarray, (rates, np.moveaxis(weights, -1, 0))))
 
 
 def weights_of_loads(gripper: Gripper, network: Network) -> Array:
@@ -121,7 +115,7 @@ def superpose(
     step response starts at zero, so h(t) = sum_j w_j (e^(p_j t) - 1), which loses no digits to the
     constant if a sample creeps far from its rest. Ramps and parabolas are its integrals.
     """
-    total = np.zeros((len(response.static), len(time_s)))
+    total = np.zeros((len(response.rates), len(time_s)))
     weights, rates = response.weights[:, arm], response.rates[:, :, None]
     for start, order, height in course.jumps:
         after = time_s >= start
@@ -130,11 +124,14 @@ def superpose(
     return total
 
 
-def linear_jaw_force(response: StepResponse, course: Course, time_s: Array) -> Array:
-    """Compute the jaw force in N, (n, n_times), from its step response; at a step, after it."""
+def linear_jaw_force(
+    gripper: Gripper, network: Network, course: Course, time_s: Array, *, inertia: bool
+) -> Array:
+    """Compute the jaw force of samples in N, (n, n_times); at a step, what follows it."""
+    response = step_response(gripper, network, inertia=inertia, force=True)
     force = np.zeros((len(response.rates), len(time_s)))
-    rates = response.rates[:, :, None]
-    static, weights = response.static[:, 0], response.weights[:, 0]
+    rates, weights = response.rates[:, :, None], response.weights[:, 0]
+    static = Arms(gripper).force_at_rest(network)
     for start, order, height in course.jumps:
         after = time_s >= start
         elapsed = time_s[after] - start
@@ -261,17 +258,9 @@ class Arms:
         z_2, z_4 = -self._chi - c_2 * away, self._chi - c_4 * away
         return (z_2 * z_4 / ((c_2 + c_4) * away) / b)[None]
 
-    def rotations_at_rest(self, network: Network) -> Array:
-        """Return the final rotations under a unit torque, (n_arms, n)."""
-        spring = self._spring(network)
-        if self.alike:
-            return np.array([0.5 / spring] * 2)
-        k_2, k_4 = self._k / self._k.sum()
-        return np.array([k_4 / spring, k_2 / spring])
-
     def force_at_rest(self, network: Network) -> Array:
-        """Return the final jaw force under a unit torque, (1, n)."""
-        return (self._lever_m * network.k_p / self._spring(network))[None]
+        """Return the final jaw force under a unit torque, (n,)."""
+        return self._lever_m * network.k_p / self._spring(network)
 
     def _spring(self, network: Network) -> NDArray[Any]:
         """Return A, (n,)."""

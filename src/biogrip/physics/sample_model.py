@@ -131,8 +131,6 @@ class SampleModel:
     name, where a trace is the same whichever is called which; in ascending order (`in_order`)."""
     contains: Mapping[str, Turned] = field(default_factory=dict, hash=False)
     """Models that it becomes where elements vanish, and how their parameters become its own."""
-    branched: "Callable[[int], SampleModel] | None" = None
-    """Makes the model with a number of Maxwell branches, if there is such."""
 
     @property
     def names(self) -> tuple[str, ...]:

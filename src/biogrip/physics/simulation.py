@@ -3,24 +3,18 @@
 In the nonlinear model F - F_linear = g - (c u' + k u)/b_0^2, with g the load and u the correction
 of `biogrip.physics.nonlinear`, all of second order: no large terms cancel. Targets have the arms'
 inertia, fits leave it out: after a change of the torque, arms ring for milliseconds, and later
-changes are negligible (docs/model.md, "Without inertia"). What shows of the ring is found here.
+changes are negligible (docs/model.md, "Without inertia").
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.physics.gripper import Gripper
-from biogrip.physics.modes import mode_responses, relaxation
+from biogrip.physics.modes import elements_of, mode_responses
 from biogrip.physics.protocol import Course
-from biogrip.physics.response import (
-    LEFT,
-    linear_jaw_force,
-    step_response,
-    superpose,
-)
+from biogrip.physics.response import LEFT, linear_jaw_force, step_response, superpose
 from biogrip.physics.sample_model import Network
 
 
@@ -38,8 +32,7 @@ def jaw_force(
     By either model, as in `simulated_response`; at the instant of a step: what follows it. Without
     inertia, the force may jump.
     """
-    response = step_response(gripper, network, inertia=inertia, force=True)
-    force = linear_jaw_force(response, course, time_s)
+    force = linear_jaw_force(gripper, network, course, time_s, inertia=inertia)
     if nonlinear:
         from biogrip.physics.nonlinear import correction
 
@@ -114,13 +107,14 @@ def simulated_response(
 
         return nonlinear_rotation(gripper, network, course, time_s)
     if course.deforms:
-        return relaxation(network, course, time_s)
-    response = step_response(gripper, network, inertia=gripper.has_inertia)
-    if gripper.has_inertia:
-        return superpose(response, course, time_s)
-    growth, _ = mode_responses(response.rates, course, time_s, slopes=False)
-    rotation: Array = (response.weights[:, LEFT, None] @ growth)[:, 0]
-    return rotation
+        rates, weights = elements_of(network)
+    else:
+        response = step_response(gripper, network, inertia=gripper.has_inertia)
+        if gripper.has_inertia:
+            return superpose(response, course, time_s)
+        rates, weights = response.rates, response.weights[:, LEFT]
+    read: Array = (weights[:, None] @ mode_responses(rates, course, time_s))[:, 0]
+    return read
 
 
 # A ring of exp(-36) is lost in rounding.
@@ -139,37 +133,6 @@ class Ring:
     """Largest change of a reading by inertia, in standard deviations of the noise."""
     lasts_s: float
     """Time after a change of the torque of the last reading that would have to be left out."""
-
-
-def find_ring(
-    gripper: Gripper,
-    network: Network,
-    course: Course,
-    time_s: Array,
-    in_noise: Callable[[Array], Array],
-) -> Ring | None:
-    """Return what shows of the ringing of arms on the first sample, or None.
-
-    A parallel damper ends a ring. It only counts if it is seen when the ring is over, too: what
-    readings of a ring tell of it, without inertia, is the ring's. `in_noise` turns a change of the
-    readings, (n_samples,), into standard deviations of white noise.
-    """
-    if not gripper.has_inertia:
-        return None
-    springs = network.k_p + network.k.sum(axis=1) + gripper.jaw_stiffness_N_per_m
-    is_seen = network.c_p > ringing_s(gripper) * springs
-    network = replace(network, c_p=np.where(is_seen, network.c_p, 0.0))
-    elapsed = elapsed_s(course, time_s)
-    ringing = elapsed <= ringing_s(gripper)
-    change = np.zeros(len(time_s))
-    change[ringing] = ring(gripper, network, course, time_s[ringing])[0]
-    shown = in_noise(change)
-    latest_first = np.argsort(-elapsed, kind="stable")
-    norms = np.sqrt(np.cumsum(shown[latest_first] ** 2))
-    visible = np.flatnonzero(norms > VISIBLE)
-    if not len(visible):
-        return None
-    return Ring(float(np.max(np.abs(shown))), float(elapsed[latest_first[visible[0]]]))
 
 
 def ringing_s(gripper: Gripper) -> float:

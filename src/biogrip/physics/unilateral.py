@@ -14,7 +14,7 @@ as many digits of the slow rates as by the eigenvalues of its square.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,10 +65,11 @@ def unilateral_response(
     """
     system, lengths = _System(gripper, network), np.diff(torque.time_s, append=torque.end_s)
     # Start and length of each phase, and the torques of both arms in it.
-    loads_of = (_Forcing(np.stack((powers, powers))) for powers in torque.within_phases)
-    pieces = list(zip(torque.time_s.tolist(), lengths.tolist(), loads_of, strict=True))
+    both = [np.stack((powers, powers)) for powers in torque.within_phases]
+    pieces = list(zip(torque.time_s.tolist(), lengths.tolist(), both, strict=True))
     most_torque = max(
-        float(np.max(np.abs(loads.at(np.array([0.0, length]))))) for _, length, loads in pieces
+        float(np.max(np.abs(_loads(torques, np.array([0.0, length])))))
+        for _, length, torques in pieces
     )
     softest = min(arm.stiffness_Nm_per_rad for arm in (gripper.left, gripper.right))
     least = {
@@ -81,11 +82,13 @@ def unilateral_response(
     touching, state = True, np.zeros(3 + branches)
     parted: list[float] = []
     met: list[float] = []
-    for start, length, loads in pieces:
+    for start, length, torques in pieces:
         done = 0.0
         while True:
             go_on = system.in_contact if touching else system.apart
-            stretch = go_on(state, loads.later(done))
+            # The torques, counted from there on.
+            shift = np.array([[1, 0, 0], [done, 1, 0], [done**2 / 2, done, 1]])
+            stretch = go_on(state, torques @ shift)
             grid = _grid(stretch.fastest_per_s, length - done)
             lasts = _first_below(stretch.margin, grid, least[touching])
             begin, end = start + done, start + (length if lasts is None else done + lasts)
@@ -114,23 +117,9 @@ def unilateral_response(
     )
 
 
-@dataclass(frozen=True)
-class _Forcing:
-    """Loads from an instant on, while the torque is smooth."""
-
-    powers: Array
-    """Value, slope and curvature at that instant, (n_loads, 3)."""
-
-    def at(self, elapsed_s: Array) -> Array:
-        """Return the loads at times since the instant, (n_loads, n_times)."""
-        powers = np.stack((np.ones_like(elapsed_s), elapsed_s, elapsed_s**2 / 2))
-        return self.powers @ powers
-
-    def later(self, elapsed_s: float) -> "_Forcing":
-        """Return the same loads, counted from a later instant on."""
-        t = elapsed_s
-        shift = np.array([[1, 0, 0], [t, 1, 0], [t**2 / 2, t, 1]])
-        return _Forcing(self.powers @ shift)
+def _loads(powers: Array, elapsed_s: Array) -> Array:
+    """Return loads at times, (n_loads, n_times), by value, slope and curvature, (n_loads, 3)."""
+    return powers @ np.stack((np.ones_like(elapsed_s), elapsed_s, elapsed_s**2 / 2))
 
 
 class _Modes:
@@ -144,51 +133,28 @@ class _Modes:
         self._out = inverse.T @ turns.T
         self._drive = turns @ inverse
 
-    def follow(self, state: Array, forcing: _Forcing) -> "_Motion":
-        """Return the motion from a state, (n_states,), under loads on the first states."""
-        drive = self._drive[:, : len(forcing.powers)]
-        return _Motion(
-            self.rates[:, None],
-            self._out,
-            self._into @ state,
-            _Forcing(drive @ forcing.powers),
-        )
+    def follow(self, state: Array, powers: Array) -> Callable[[Array], tuple[Array, Array]]:
+        """Return states and their rates of change, (n_states, n_times), as a function of time.
+
+        They go on from a state, (n_states,), under loads on the first states, see `_loads`.
+        """
+        rates, start = self.rates[:, None], (self._into @ state)[:, None]
+        powers = self._drive[:, : len(powers)] @ powers
+
+        def motion(elapsed_s: Array) -> tuple[Array, Array]:
+            z = -rates * elapsed_s
+            modes: NDArray[Any] = np.exp(z) * start
+            for order in range(3):
+                load = powers[:, order, None]
+                if np.any(load):
+                    phi = phi_functions(order + 1, z)[-1]
+                    modes = modes + load * elapsed_s ** (order + 1) * phi
+            return self._out @ modes, self._out @ (_loads(powers, elapsed_s) - rates * modes)
+
+        return motion
 
 
-@dataclass(frozen=True)
-class _Motion:
-    """Motion of a system from an initial state."""
-
-    rates: Array
-    """Rates of decay, (n_modes, 1)."""
-    shapes: Array
-    """States by modes, (n_states, n_modes)."""
-    start: Array
-    """Initial values of the modes, (n_modes,)."""
-    forcing: _Forcing
-    """Loads on the modes."""
-
-    def at(self, elapsed_s: Array) -> Array:
-        """Return the states at times since the beginning, (n_states, n_times)."""
-        return self.shapes @ self._modes(elapsed_s)
-
-    def rate(self, elapsed_s: Array) -> Array:
-        """Return the states' rates of change at times since the beginning."""
-        loads = self.forcing.at(elapsed_s)
-        return self.shapes @ (loads - self.rates * self._modes(elapsed_s))
-
-    def _modes(self, elapsed_s: Array) -> Array:
-        z = -self.rates * elapsed_s
-        modes: NDArray[Any] = np.exp(z) * self.start[:, None]
-        for order in range(3):
-            load = self.forcing.powers[:, order, None]
-            if np.any(load):
-                modes = modes + load * elapsed_s ** (order + 1) * phi_functions(order + 1, z)[-1]
-        return modes
-
-
-@dataclass(frozen=True)
-class _Stretch:
+class _Stretch(NamedTuple):
     """Solution from an instant on, with or without contact, as functions of the time since then.
 
     The state, (n, n_times), is phi_2, phi_4, delta and the branches' dampers. The margin, which may
@@ -225,27 +191,28 @@ class _System:
         rest = np.sqrt(k)[:, None] * np.hstack((np.ones((n, 1)), -np.eye(n)))
         self._sample = _Modes(np.vstack((own, rest)), np.diag(np.sqrt(np.append(c_p, c))))
 
-    def in_contact(self, state: Array, torque: _Forcing) -> _Stretch:
+    def in_contact(self, state: Array, torques: Array) -> _Stretch:
         """Solve from a state on, in contact."""
-        motion = self._touching.follow(np.delete(state, 2), torque)
+        motion = self._touching.follow(np.delete(state, 2), torques)
 
         def states(elapsed_s: Array) -> Array:
-            z = motion.at(elapsed_s)
+            z, _ = motion(elapsed_s)
             return np.insert(z, 2, self._b * (z[0] + z[1]), axis=0)
 
         def force(elapsed_s: Array) -> Array:
-            phi, rate = motion.at(elapsed_s)[0], motion.rate(elapsed_s)[0]
-            return (torque.at(elapsed_s)[0] - self._k[0] * phi - self._c[0] * rate) / self._b
+            (phi, *_), (rate, *_) = motion(elapsed_s)
+            held = _loads(torques, elapsed_s)[0] - self._k[0] * phi - self._c[0] * rate
+            return held / self._b
 
         return _Stretch(states, force, float(self._touching.rates.max()))
 
-    def apart(self, state: Array, torque: _Forcing) -> _Stretch:
+    def apart(self, state: Array, torques: Array) -> _Stretch:
         """Solve from a state on, without contact."""
-        arms = self._arms.follow(state[:2], torque)
-        sample = self._sample.follow(state[2:], _Forcing(np.zeros((0, 3))))
+        arms = self._arms.follow(state[:2], torques)
+        sample = self._sample.follow(state[2:], np.zeros((0, 3)))
 
         def states(elapsed_s: Array) -> Array:
-            return np.vstack((arms.at(elapsed_s), sample.at(elapsed_s)))
+            return np.vstack((arms(elapsed_s)[0], sample(elapsed_s)[0]))
 
         def gap(elapsed_s: Array) -> Array:
             z = states(elapsed_s)

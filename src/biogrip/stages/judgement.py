@@ -13,6 +13,7 @@ bound assumes. Some seeds get a full verdict as well, as users are shown it: mul
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -68,7 +69,7 @@ def expect(case: Case, target: Path, calibrated: list[Path], expected: Path) -> 
     gain = len(time_s) * (misfit**2 - found.misfit**2) / (noise_sd or found.misfit) ** 2
     if gain < _ROUNDING:
         # Along what nothing tells, digits of the target would choose, and those of a processor.
-        found = found.replaced(np.exp(truth), misfit, converged=True)
+        found = replace(found, parameters=np.exp(truth), misfit=misfit, converged=True)
     diagnosis = diagnose(problem, found, confidence=case.confidence)
     _write(expected, case, diagnosis, {})
 

@@ -268,7 +268,7 @@ class SampleBlock(Checked, BaseModel):
 
     def complaints(self) -> Iterator[Complaint]:
         """Find parameters that the model does not have, or whose values it does not allow."""
-        if self.branches != 1 and MODELS[self.model].branched is None:
+        if self.branches != 1 and self.model != "generalized_maxwell":
             yield ("branches",), "only generalized_maxwell has a number of branches."
             return
         model = self.sample.model
