@@ -208,8 +208,7 @@ def spread_lags(course: Course, time_s: Array, a_decade: int) -> list[float]:
     """Return lags over a protocol, see `lag_course`, so many a decade, for ascending times."""
     shortest = _SHORTEST * float(np.diff(time_s).min()) / course.end_s
     count = 2 + int(a_decade * np.log10(_LONGEST / shortest))
-    lags: list[float] = np.geomspace(shortest, _LONGEST, count).tolist()
-    return lags
+    return np.geomspace(shortest, _LONGEST, count).tolist()
 
 
 def fit_responses(trace: Array, responses: Array) -> tuple[Array, float]:

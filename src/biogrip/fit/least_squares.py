@@ -271,8 +271,7 @@ def _best(found: Minima, which: BoolArray, count: int) -> IntArray:
     """Return the indices of the best fits among those that `which` marks."""
     chosen = np.flatnonzero(which)
     order = np.argsort(found.misfit[chosen].astype(np.float32), kind="stable")
-    best: IntArray = chosen[order[:count]]
-    return best
+    return chosen[order[:count]]
 
 
 def _descents(found: Minima, before: Row) -> list[Row]:

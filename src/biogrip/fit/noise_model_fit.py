@@ -50,16 +50,14 @@ def outliers_of(residual: Array, rounding: float = 0.0) -> BoolArray:
     if not len(others):
         return np.zeros(len(residual), dtype=bool)
     scale = max(float(np.median(others)) / GAUSSIAN, rounding / ROOT_12)
-    found: BoolArray = apart > FAR * scale
-    return found
+    return apart > FAR * scale
 
 
 def measure_distances(residual: Array) -> Array:
     """Measure how far residuals are from the median of the eleven around, (n_samples,)."""
     from scipy.ndimage import median_filter
 
-    apart: Array = np.abs(residual - median_filter(residual, _AROUND, mode="mirror"))
-    return apart
+    return np.abs(residual - median_filter(residual, _AROUND, mode="mirror"))
 
 
 # Significance level: share of traces with the same noise everywhere in which it seems to grow.
@@ -116,14 +114,12 @@ def significance_of_growth(apart: Array, size: Array) -> float:
 def _ranks(values: Array) -> Array:
     """Return ranks, equal values with the mean of theirs."""
     _, place, count = np.unique(values, return_inverse=True, return_counts=True)
-    ranks: Array = (np.cumsum(count) - (count - 1) / 2)[place]
-    return ranks
+    return (np.cumsum(count) - (count - 1) / 2)[place]
 
 
 def _growth(log_odds: float, size: Array) -> Array:
     share = 1 / (1 + np.exp(-log_odds))
-    growth: Array = np.sqrt(1 - share + share * size**2 / np.mean(size**2))
-    return growth
+    return np.sqrt(1 - share + share * size**2 / np.mean(size**2))
 
 
 def _deviance(apart: Array, growth: Array) -> float:
@@ -226,8 +222,7 @@ class NoiseModelLikelihood:
                 mixed = (both + 2 * middle - ahead[i] - ahead[j] - behind[i] - behind[j]) / 2
                 curvature[i, j] = curvature[j, i] = mixed
         sizes, axes = np.linalg.eigh(curvature / (2 * _APART**2))
-        information: Array = (axes * np.maximum(sizes, 0)) @ axes.T + np.eye(len(x)) / _KNOWN**2
-        return information
+        return (axes * np.maximum(sizes, 0)) @ axes.T + np.eye(len(x)) / _KNOWN**2
 
     def _deviance(self, x: Array) -> float:
         free, (left, of_reached, determinant) = self._free, self._parts(x)
@@ -290,5 +285,4 @@ def absorbed(directions: Array) -> Array:
     sizes = np.linalg.norm(directions, axis=1)
     rows = directions[sizes > 0] / sizes[sizes > 0, None]
     _, shares, basis = np.linalg.svd(rows, full_matrices=False)
-    kept: Array = basis[shares > 1e-8]
-    return kept
+    return basis[shares > 1e-8]

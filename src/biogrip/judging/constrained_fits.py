@@ -135,8 +135,7 @@ class QuantityConstraint:
         if tried is not None:
             weight = np.where(tried, 0.0, weight)
         chosen = np.argmax(weight, axis=1)[:, None] == np.arange(x.shape[1])
-        marked: BoolArray = chosen & (weight > 0)
-        return marked
+        return chosen & (weight > 0)
 
     def _late(self, x: Array, fit: IntArray) -> tuple[Array, Array]:
         """Return the residuals of hinges, (n, n_hinges), and their log-parameter derivatives."""
@@ -254,8 +253,7 @@ class ConstrainedFits:
 
     def _increases(self, found: Minima, trace: IntArray) -> Array:
         excess = found.misfit**2 - self._misfit[trace] ** 2
-        increases: Array = self._residuals.samples * excess / self._noise_sd[trace] ** 2
-        return increases
+        return self._residuals.samples * excess / self._noise_sd[trace] ** 2
 
     def slowest(self, profile: int) -> float | None:
         """Return the relaxation time in s of a branch of an optimum that is too slow, if any."""

@@ -90,8 +90,7 @@ class Points:
     def extremes(self) -> Array:
         """Return the fits at both ends of profiles, (2 n_quantities, n_traces, n_parameters)."""
         ends = self.x[self.ends()].reshape(2, len(self.fits.likelihoods), -1, self.x.shape[1])
-        extremes: Array = np.concatenate(ends.swapaxes(1, 2))
-        return extremes
+        return np.concatenate(ends.swapaxes(1, 2))
 
     def smooth(self, limits: Array) -> None:
         """Add limits, (n_profiles, 2) or NaN, and midpoints of neighbours far apart in drawings."""

@@ -90,8 +90,7 @@ def wandering(residual: Array, basis: Array) -> float:
     starts = np.append(0, np.cumsum(sizes)[:-1])
 
     def means_of(rows: Array) -> Array:
-        sums: Array = np.add.reduceat(rows, starts, axis=-1) / np.sqrt(sizes)
-        return sums
+        return np.add.reduceat(rows, starts, axis=-1) / np.sqrt(sizes)
 
     observed = float(np.sum(means_of(residual) ** 2) / np.sum(residual**2))
     means = means_of(basis)
@@ -116,8 +115,7 @@ def averaged(basis: Array) -> Array:
         row[part] = len(part) ** -0.5
     rest = without(basis, rows)
     _, shares, found = np.linalg.svd(rest, full_matrices=False)
-    kept: Array = found[shares > levels.TOLD]
-    return kept
+    return found[shares > levels.TOLD]
 
 
 def _chance_of_less(observed: float, first: float, second: float, free: int, most: float) -> float:
@@ -289,8 +287,7 @@ class Steps:
     def along(self, residual: Array) -> Array:
         """Return the part of residuals, (n_samples,), along each step without what is absorbed."""
         # No matrix of what is left of all steps is formed, which takes most of the time.
-        found: Array = self.whole @ without(self.basis, residual) / self.norms
-        return found
+        return self.whole @ without(self.basis, residual) / self.norms
 
     def chance(self, share: float) -> float:
         """Return the chance that white noise has such a share of its squares in one of them."""
@@ -318,8 +315,7 @@ class Steps:
 
 def _density(level: Array | float) -> Array:
     """Return the density of the normal distribution."""
-    found: Array = np.exp(-0.5 * np.square(level)) / np.sqrt(2 * np.pi)
-    return found
+    return np.exp(-0.5 * np.square(level)) / np.sqrt(2 * np.pi)
 
 
 @dataclass(frozen=True)

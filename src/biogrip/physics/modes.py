@@ -182,8 +182,7 @@ def lag_course(course: Course, shares: Sequence[float], time_s: Array) -> Array:
     given as shares of the protocol's duration.
     """
     rates, sign = -1 / (course.end_s * np.array(shares)), 1.0 if course.deforms else -1.0
-    lags: Array = sign * mode_responses(rates[None], course, time_s)[0]
-    return lags
+    return sign * mode_responses(rates[None], course, time_s)[0]
 
 
 def mode_responses(rates: Array, course: Course, time_s: Array) -> Array:

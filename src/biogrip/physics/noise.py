@@ -151,8 +151,7 @@ def add_noise(
     if noise.outliers is not None:
         struck = rng.random(len(time_s)) < noise.outliers.share
         unit += struck * noise.outliers.size * rng.standard_normal(len(time_s))
-    noisy: Array = readings + standard_deviation(readings, noise) * unit
-    return noisy
+    return readings + standard_deviation(readings, noise) * unit
 
 
 def standard_deviation(readings: Array, noise: Noise) -> Array:

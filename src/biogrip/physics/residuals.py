@@ -150,8 +150,7 @@ class Residuals:
 
     def response(self, log_parameters: Array) -> Array:
         """Return the simulated response, neither cleared nor whitened, (n_samples,)."""
-        response: Array = self._simulated(log_parameters)[0]
-        return response
+        return self._simulated(log_parameters)[0]
 
     def gradients(
         self, log_parameters: Array, others: Sequence["Residuals"]
@@ -228,5 +227,4 @@ class Residuals:
 
     def _simulated(self, log_parameters: Array) -> Array:
         given = self.gripper, self.model, self.course, self.trace.time_s
-        rows: Array = linear_responses(*given, np.exp(log_parameters[None]))[0]
-        return rows
+        return linear_responses(*given, np.exp(log_parameters[None]))[0]

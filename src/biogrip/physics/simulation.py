@@ -113,8 +113,7 @@ def simulated_response(
         if gripper.has_inertia:
             return superpose(response, course, time_s)
         rates, weights = response.rates, response.weights[:, LEFT]
-    read: Array = (weights[:, None] @ mode_responses(rates, course, time_s))[:, 0]
-    return read
+    return (weights[:, None] @ mode_responses(rates, course, time_s))[:, 0]
 
 
 # A ring of exp(-36) is lost in rounding.

@@ -185,8 +185,7 @@ def chi_square_increase(found: "pd.DataFrame", case: Case, of: str = "misfit") -
     misfit = found["misfit"]
     lowest = misfit.groupby(found["seed"]).transform("min")
     lowest = np.fmin(lowest, found["noise_rms"].where(found["noise_rms"] > 0))
-    increase: Array = len(case.times_s) * ((found[of] / lowest) ** 2 - 1).to_numpy(float)
-    return increase
+    return len(case.times_s) * ((found[of] / lowest) ** 2 - 1).to_numpy(float)
 
 
 def reached_encodable(found: "pd.DataFrame", case: Case) -> BoolArray:
@@ -196,8 +195,7 @@ def reached_encodable(found: "pd.DataFrame", case: Case) -> BoolArray:
     """
     misfit, encodable = (found[name].to_numpy(float) for name in ("misfit", "encodable_misfit"))
     above = len(case.times_s) * (misfit**2 - encodable**2)
-    reached: BoolArray = above <= case.study.optimum_tolerance * encodable**2
-    return reached
+    return above <= case.study.optimum_tolerance * encodable**2
 
 
 def share_with_limits(count: int, runs: int) -> tuple[float, float, float]:
@@ -226,8 +224,7 @@ def near_noise(found: "pd.DataFrame", tolerance: float) -> BoolArray:
     `chi_square_increase`.
     """
     misfit, noise = (found[name].to_numpy(float) for name in ("misfit", "noise_rms"))
-    reached: BoolArray = misfit <= (1 + tolerance) * noise
-    return reached
+    return misfit <= (1 + tolerance) * noise
 
 
 def near_noise_words(tolerance: float) -> str:
