@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 from contextlib import redirect_stderr
+from importlib import import_module
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,6 @@ import pandas as pd
 import pytest
 import yaml
 
-from biogrip.arrays import Array
 from biogrip.cli import _parser, main
 from biogrip.command.options import Setting
 from biogrip.command.outputs import WRITTEN_BY, Outcome, table_of
@@ -23,7 +23,6 @@ from biogrip.command.settings import Asked, case_of
 from biogrip.command.words import for_a_paper, in_columns, noise_in_words
 from biogrip.errors import BiogripError
 from biogrip.judging.doubts import REJECTION
-from biogrip.judging.onset import notes_on_start
 from biogrip.physics.models import CANDIDATES
 from biogrip.study.source import HOLD
 from tests.generated_docs import example
@@ -255,20 +254,25 @@ def test_nobody_reading_progress_is_no_error(tmp_path: Path, few: Path) -> None:
     assert (done.returncode, done.stdout) == (128 + signal.SIGPIPE, "")
 
 
+@pytest.mark.parametrize("where", ["identify.identify.notes_on_start", "command.files.trace_data"])
 def test_a_trace_whose_fit_fails_costs_no_other_its_result(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, where: str
 ) -> None:
-    """A fault of ours, here of a test that only adds notes: a row says why, alone one message."""
+    """A fault of ours, in a note or in what is said at last: a row says why, alone one message."""
     good, bad = tmp_path / "good.csv", tmp_path / "bad.csv"
     write_drop(good, 0)
     bad.write_text("".join(good.read_text().splitlines(keepends=True)[:60]))
 
-    def fails(problem: Any, time_s: Array, *given: Any, **more: Any) -> Any:
-        if len(time_s) < 60:
-            raise ValueError("min() arg is an empty sequence")
-        return notes_on_start(problem, time_s, *given, **more)
+    module, _, name = f"biogrip.{where}".rpartition(".")
+    works = getattr(import_module(module), name)
 
-    monkeypatch.setattr("biogrip.identify.identify.notes_on_start", fails)
+    def fails(*given: Any, **more: Any) -> Any:
+        samples = given[0].likelihood.problem.residuals.samples if not given[1:] else len(given[1])
+        if samples < 60:
+            raise ValueError("min() arg is an empty sequence")
+        return works(*given, **more)
+
+    monkeypatch.setattr(f"biogrip.{where}", fails)
     table, options = tmp_path / "found.csv", ("--no-compare", "--model", "liquid_drop")
     # It is known as ours by the end of a long header.
     table.write_text(f"{'k value (N/m),' * 1000}{WRITTEN_BY}\n")

@@ -10,12 +10,15 @@ from scipy.optimize import nnls
 from scipy.stats import chi2
 
 from biogrip.arrays import Array
+from biogrip.fit.any_sample import fit_any_sample
 from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
 from biogrip.judging.without_model import (
     _ADDED,
     LEVEL,
     Told,
     WithoutModel,
+    _Profile,
+    _Quantity,
     decades,
     tell_without_model,
 )
@@ -219,6 +222,20 @@ def test_a_misfit_of_any_sample_widens_limits() -> None:
 def test_a_damper_has_a_loss_tangent_without_an_upper_limit() -> None:
     flows = by_name(tell(TIMES, TIMES / 200 + noise(0.01), reads="strain"))
     assert flows["tan delta(0.1 rad/s)"].verdict == BOUNDED_BELOW
+
+
+def test_what_is_nothing_but_rounding_has_no_lower_limit() -> None:
+    """The slope of a branch that was gone long before: 1e-309, beside what others could add."""
+    posed = set_up(INSTRUMENTS["stress"], HELD, Sample("maxwell"))
+    fit = fit_any_sample(posed.of(TIMES, zener(TIMES) + noise(0.1)).residuals)
+    own = fit.lags.rates[fit.amplitudes > 0]
+
+    def slope(_: float, rates: Array) -> Array:
+        return np.where(np.isin(rates, own), 1e-311, 1.0)
+
+    profile = _Profile(fit, _Quantity("slope", LEVEL, 10.0, "", slope), lambda more: 2.0)
+    assert 0 < profile.best < 1e-305
+    assert profile.limit(-1) is None
 
 
 @pytest.mark.parametrize("count", [4, 6, 10])

@@ -265,9 +265,13 @@ def identify_batch(
                     told.note(form_in_words(own.trace, recording.form))
                 read[index] = case, prepare(recording, case.judged_experiment)
         judged = _judge_batch(asked, read, refused, told)
+    said: dict[int, dict[str, Any]] = {}
     for index, diagnosis in sorted(judged.items()):
         own, (case, _) = asked[index], read[index]
-        data = data_of(diagnosis, case, own.name, own.given)
+        with _caught(own, refused):
+            said[index] = data_of(diagnosis, case, own.name, own.given)
+    for index, data in said.items():
+        own, diagnosis = asked[index], judged[index]
         outcome.found.append(data)
         if outputs is not None:
             write_result(outputs[index], data, made_from[index])

@@ -55,8 +55,8 @@ _INNER = 2.0
 # A limit hangs on what hardly shows if a noise of that changes the quantity so many times more.
 _HANGS = 10.0
 # Standard deviation of a quantity that counts as none, over the largest that a noise of one lag
-# makes.
-_LEAST = 1e-3
+# makes; and a quantity that does, over its standard deviation.
+_LEAST, _ROUNDING = 1e-3, 1e-15
 
 # Share of a value below which a lower limit says no more than that it is positive.
 _LITTLE = 0.01
@@ -300,7 +300,8 @@ class _Profile:
 
     def limit(self, side: int) -> float | None:
         """Find the limit on a side, -1 or 1, if there is one."""
-        nothing = side < 0 and self.best <= 0
+        # Beside its standard deviation it may be rounding.
+        nothing = side < 0 and self.best <= _ROUNDING * self._stride
         if not 0 < self._stride < math.inf or side in self._open or nothing:
             return None
         found, needed = self._closely(side, self.best + side * self._stride, self._root(0))
