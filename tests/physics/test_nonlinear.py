@@ -69,7 +69,12 @@ def integrated(
         here = np.minimum(time_s[(time_s > start) & (time_s <= end)], last)
         at = np.unique(np.append(here, last))
         given = {"rtol": 1e-8, "atol": allowed, "max_step": max_step_s}
-        solved = solve_ivp(lambda t, z: motion(t, z)[0], (start, last), state, "Radau", at, **given)
+
+        def moved(t: float, z: Array, last: float = last) -> Array:
+            # A step that ends with the phase may round to the next one.
+            return motion(min(t, last), z)[0]
+
+        solved = solve_ivp(moved, (start, last), state, "Radau", at, **given)
         assert solved.success, solved.message
         for t, now in zip(here, solved.y.T, strict=False):
             found.append(np.append(now[:n], motion(t, now)[1]))
