@@ -38,12 +38,17 @@ JUDGED = diagnosed(EXPERIMENT, SAMPLE)
 
 def planted(words: str, response: Array) -> Array:
     """A response with an error as its sentence says."""
+    if "late" in words:
+        late_s, best = float(re.findall(r"by (\S+) s", words)[0]), JUDGED.likelihood.best
+        fit = dict(zip(SAMPLE, np.exp(best), strict=True))
+        # The first reading is one interval after the step.
+        return simulate(EXPERIMENT, fit, np.maximum(TIMES - late_s, 1e-3))
     size = float(re.findall(r"(\S+) %", words)[0]) / 100
     after = float(re.findall(r"at (\S+) s", words)[0]) <= TIMES
     return response + size * after * (response if "gain" in words else np.max(np.abs(NOISY)))
 
 
-@pytest.mark.parametrize("kind", ["A jump", "A gain"])
+@pytest.mark.parametrize("kind", ["A jump", "A gain", "A start"])
 def test_an_error_that_is_planted_moves_what_is_said(kind: str) -> None:
     """To second order: its moves are a sixth at most."""
     (hidden,) = (each for each in JUDGED.hidden if each.words().startswith(kind))

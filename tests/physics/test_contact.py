@@ -19,6 +19,7 @@ from biogrip.physics.gripper import (
     voltage,
 )
 from biogrip.physics.noise import Noise, add_noise
+from tests.helpers.default import STUDY, study_of
 from workflow.paper import mechanics
 
 
@@ -159,3 +160,12 @@ def test_calibration_is_written_and_read_back(tmp_path: Path) -> None:
     path.write_text("gripper: {left: 3}")
     with pytest.raises(BiogripError, match="cannot be read as a calibration"):
         calibration.read_calibrated_arms(path, nominal)
+
+
+def test_closing_onto_a_sample_leaves_less_stroke() -> None:
+    """Each tip goes half of the way: l (cos(hat - phi) - cos hat) = (gap - size)/2."""
+    sized = study_of("cases: {endothelial_cell: {sample: {size_m: 100.0e-6}}}")
+    hat, closed = math.radians(75), 25e-6 / 1.5e-3
+    phi = hat - math.acos(math.cos(hat) + closed)
+    assert sized.case("endothelial_cell").stroke == pytest.approx(math.radians(4.5) - phi)
+    assert STUDY.case("endothelial_cell").stroke == math.radians(4.5)

@@ -1,3 +1,4 @@
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +11,10 @@ from biogrip.fit.problem import METHODS
 from biogrip.physics.models import MODELS, Published, Sample
 from biogrip.records.identifications import (
     ALL,
+    ENCODABLE,
     MODEL_FITS,
     basins,
+    chi_square_increase,
     columns,
     near_noise,
     share_with_limits,
@@ -227,3 +230,19 @@ def test_two_basins_have_a_tenth_of_the_runs_each() -> None:
         assert list(basins(found([3.0, 1.0], [noise, noise]), 0.02)) == [ALL]
     runs = found([1.019, 1.021, 2.03, 1.0], [1.0, 1.0, 2.0, None])
     np.testing.assert_array_equal(near_noise(runs, 0.02), [True, False, True, False])
+
+
+def test_chi_squared_increases_over_the_lowest_of_its_trace() -> None:
+    """Of any method or, where it is lower, of the true parameters."""
+    found = pd.DataFrame(
+        {"seed": [0, 0, 1], "misfit": [2, 3, 5], "noise_rms": 4.0, ENCODABLE: [4, 4, 8]}
+    )
+    case = seen(times_s=np.arange(10.0))
+    assert chi_square_increase(found, case).tolist() == [0, 12.5, 5.625]
+    assert chi_square_increase(found, case, ENCODABLE).tolist() == [30, 30, 30]
+
+
+def test_what_is_printed_is_rounded_or_cut_off() -> None:
+    ways = [tuple(map(float, ends)) for ends in cases._ways(Decimal("1.2"))]
+    assert ways == [(1.15, 1.25), (1.2, 1.3)]
+    assert [tuple(map(float, ends)) for ends in cases._ways(Decimal("0"))][1] == (-1, 1)
