@@ -260,6 +260,7 @@ def _with_instrument(
     block = checked(MeasurementBlock, measurement)[0]
     controlled = (instrument if block is None else block.instrument).controlled
     found = {**merged, "instrument": kind, "measurement": measurement}
+    # Load and length are filled in below, as far as they are known.
     phase = {"duration_s": 1.0, controlled.column: 1.0}
     held = {**found, "protocol": {"phases": [phase]}}
     if instrument.sweeps:

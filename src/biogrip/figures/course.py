@@ -170,8 +170,8 @@ def draw_waterfall(case: Case, identifications: Path) -> Figure:
         mine = np.sort(increase[runs])
         place = 100 * (np.arange(len(mine)) + 0.5) / len(mine)
         label = f"{method.title}: {share_in_words(int(reached[runs].sum()), len(mine))}"
-        look = {"color": method.color, "linestyle": method.dashes, "linewidth": width}
-        axes.plot(place, mine, label=label, **look)
+        look = {"color": style.COLORS[method.color], "linewidth": width}
+        axes.plot(place, mine, label=label, linestyle=method.dashes, **look)
     least = np.sort(chi_square_increase(found, case, ENCODABLE)[runs]).clip(_LOWEST)
     axes.plot(place, least, "--", color=style.TARGET, linewidth=0.8, label="best encodable point")
     axes.set(yscale="log", ylim=(_LOWEST / 2, 5 * float(increase.max())))
@@ -241,7 +241,7 @@ def _quantity(
         shown = mine[:SHOWN_SEEDS]
         # A fixed sideways scatter keeps points apart.
         x = place + 0.6 * ((np.arange(len(shown)) * 0.618034) % 1 - 0.5)
-        look = _DOTS | {"color": METHODS[name].color}
+        look = _DOTS | {"color": style.COLORS[METHODS[name].color]}
         points, ends = np.column_stack([x, shown]), ((-np.inf, bottom), (np.inf, top))
         style.points_within(axes, points, *ends, look, edge_size=3)
         low, middle, high = np.clip(quartiles[place], bottom, top)
@@ -265,7 +265,7 @@ def _quantity(
 
 def _legend(drawn: Figure, case: Case, methods: list[str], seeds: int) -> None:
     axes = drawn.axes[0]
-    marks = [(METHODS[name].title, "o", METHODS[name].color) for name in methods]
+    marks = [(METHODS[name].title, "o", style.COLORS[METHODS[name].color]) for name in methods]
     handles: list[Any] = []
     for label, marker, color in [*marks, ("beyond the axis", "^", style.TARGET)]:
         look: dict[str, Any] = {"color": color, "markersize": 4, "markeredgewidth": 0}

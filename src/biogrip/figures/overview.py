@@ -229,7 +229,8 @@ def _moduli(axes: Axes, study: Study, case: Case, identified: Path, time_s: Arra
         fits = found[[p.column for p in model.parameters]].to_numpy(float)
         moduli = _modulus(model.network(fits), omega)
         near.append(moduli[near_noise(found, study.near_noise_tolerance)])
-        look: dict[str, Any] = {"color": method.color, "linewidth": 0.4, "alpha": 0.45}
+        color = style.COLORS[method.color]
+        look: dict[str, Any] = {"color": color, "linewidth": 0.4, "alpha": 0.45}
         for index, modulus in enumerate(moduli):
             label = method.title if index == 0 else None
             for part, dashed in ((modulus.real, "-"), (modulus.imag, "--")):

@@ -14,7 +14,7 @@ References
 from bisect import insort
 from collections import defaultdict
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
@@ -192,7 +192,7 @@ def identify_many(
 
     Further starts of each trace are log-parameters, (n_further, n_parameters). `progress` is called
     after every trace. If the model has no response at any of the points, it is a `BiogripError`.
-    Not refined `to_last_digits`, misfits have nine.
+    Misfits have nine digits unless optima are refined `to_last_digits`.
     """
     pairs = zip(problems, rngs, strict=True)
     points = [screened(problem, settings, rng) for problem, rng in pairs]
@@ -352,9 +352,8 @@ def refine_optima(
 
     Found are optima, fitted with the finest tolerance, each to the trace of an index, (n,).
     Returned are optima with misfits, none above that of `found`, and the evaluations of the
-    refinement; branches sorted by relaxation time. An optimum has converged if
-    its next step would change the sum of squares by next to nothing of what the fit leaves of a
-    reading.
+    refinement; branches sorted by relaxation time. An optimum has converged if its next step would
+    change the sum of squares by next to nothing of what the fit leaves of a reading.
     """
 
     def convex(x: Array, fit: IntArray) -> Normal:
@@ -364,9 +363,12 @@ def refine_optima(
     closer = minimize(convex, found.x, low, high, _CLOSE, None, _DAMPING, _MOST_STEPS)
     model = fits.problems[0].residuals.model
     evaluations = closer.evaluations * (1 + 2 * found.x.shape[1])
+
+    def in_order(x: Array) -> Array:
+        return np.take_along_axis(x, model.in_order(np.exp(x)), axis=1)
+
     if not to_last_digits:
-        x = np.take_along_axis(closer.x, model.in_order(np.exp(closer.x)), axis=1)
-        return Minima(x, closer.misfit, evaluations, closer.converged)
+        return replace(closer, x=in_order(closer.x), evaluations=evaluations)
     here, moving = fits.on_all_samples(found.x, trace), np.arange(len(found.x))
     x, left, damping = found.x.copy(), np.full(len(moving), np.inf), np.zeros(len(moving))
     residuals = [fits.problems[own].residuals for own in trace.tolist()]
@@ -411,9 +413,8 @@ def refine_optima(
         damping[moving] = np.where(kept, less, np.maximum(more, _LITTLE))
         # A converged fit whose short step is rejected, too, is off its optimum by rounding only.
         moving = moving[kept | ~converged[moving] | (damping[moving] < _SHORT)]
-    x = np.take_along_axis(x, model.in_order(np.exp(x)), axis=1)
     converged = left <= np.maximum(_UNTOLD * left_of_one, rounding)
-    return Minima(x, here.misfit, evaluations, converged)
+    return Minima(in_order(x), here.misfit, evaluations, converged)
 
 
 def _on_grid(x: Array, step: Array, normal: Normal, low: Array, high: Array) -> Array:

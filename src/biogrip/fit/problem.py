@@ -124,7 +124,7 @@ class Method:
     step: str
     """Name of a step of the method, after each of which its history has a row."""
     color: str
-    """Colour of its lines in figures, its own, of those of `biogrip.figures.style`."""
+    """Colour of its lines in figures, its own, of `biogrip.figures.style.COLORS`."""
     dashes: str
     """Their dashes, as Matplotlib has them."""
     sure: bool = False
@@ -139,7 +139,7 @@ METHODS: dict[str, Method] = {
             "genetic algorithm",
             blocks=("genetic_algorithm",),
             step="generation",
-            color="#999999",
+            color="grey",
             dashes="-",
         ),
         Method(
@@ -147,7 +147,7 @@ METHODS: dict[str, Method] = {
             "genetic, polished",
             blocks=("genetic_algorithm", "genetic_refined"),
             step="generation, then local fit",
-            color="#D55E00",
+            color="vermilion",
             dashes="-",
             sure=True,
         ),
@@ -156,7 +156,7 @@ METHODS: dict[str, Method] = {
             "multi-start least squares",
             blocks=("least_squares",),
             step="local fit",
-            color="#0072B2",
+            color="blue",
             dashes="--",
             sure=True,
         ),
@@ -165,7 +165,7 @@ METHODS: dict[str, Method] = {
             "differential evolution",
             blocks=("differential_evolution",),
             step="generation",
-            color="#CC79A7",
+            color="purple",
             dashes="-.",
         ),
     )

@@ -20,6 +20,7 @@ from biogrip.arrays import Array
 from biogrip.digits import p_value, plain
 from biogrip.fit.any_sample import fit_any_sample
 from biogrip.fit.experiment import Experiment
+from biogrip.fit.least_squares import fit_from
 from biogrip.fit.nested_fits import (
     WORTH_A_MENTION,
     Fits,
@@ -271,6 +272,8 @@ def judge_again(
     if own is None or (increase := diagnosis.likelihood.increase(own.misfit)) > -levels.MISSED:
         return diagnosis
     if is_within(own.parameters, fit.problem):
+        # Models are compared by nine digits of their misfits: an optimum that is shown has all.
+        own = own.at(fit_from([fit.problem], np.log(own.parameters)))
         confidence = diagnosis.likelihood.confidence
         return diagnose(fit.problem, own, confidence=confidence, valley=valley)
     gone = vanished(models.chosen, own)

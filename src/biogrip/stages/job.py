@@ -12,7 +12,6 @@ import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stderr
 from dataclasses import MISSING, Field, fields
-from functools import cache
 from inspect import signature
 from pathlib import Path
 from typing import Any, ClassVar, get_type_hints
@@ -47,8 +46,27 @@ class _Named:
         return super().__getattribute__(name)
 
 
+class _NamedOfStudy(_Named, StudyConfig):
+    pass
+
+
+class _NamedOfCase(_Named, CaseBlock):
+    pass
+
+
+class _NamedOfMeasurement(_Named, MeasurementBlock):
+    pass
+
+
+class _NamedOfIdentifiability(_Named, Identifiability):
+    pass
+
+
 # Blocks of which a rule may name single keys.
-_SPLIT: dict[str, type] = {"measurement": MeasurementBlock, "identifiability": Identifiability}
+_SPLIT: dict[str, type[_Named]] = {
+    "measurement": _NamedOfMeasurement,
+    "identifiability": _NamedOfIdentifiability,
+}
 
 
 def settings(study: Study, keys: Iterable[str], case: str = "") -> dict[str, Any]:
@@ -79,7 +97,7 @@ def keys_of_cases(study: Study, *keys: str) -> list[str]:
 
 def case_of(name: str, given: Mapping[str, Any]) -> Case:
     """Return a case of which some keys are given, by `settings`."""
-    return Case(name, _named(CaseBlock, given), Study(_named(StudyConfig, given)))
+    return Case(name, _named(_NamedOfCase, given), Study(_named(_NamedOfStudy, given)))
 
 
 def study_of(given: Mapping[str, Any]) -> Study:
@@ -89,13 +107,8 @@ def study_of(given: Mapping[str, Any]) -> Study:
         if key.startswith("cases."):
             _, name, inner = key.split(".", 2)
             cases.setdefault(name, {})[inner] = value
-    blocks = {name: _named(CaseBlock, own) for name, own in cases.items()}
-    return Study(_named(StudyConfig, given, cases=blocks))
-
-
-@cache
-def _class_of(kind: type) -> Any:
-    return type(kind.__name__, (_Named, kind), {})
+    blocks = {name: _named(_NamedOfCase, own) for name, own in cases.items()}
+    return Study(_named(_NamedOfStudy, given, cases=blocks))
 
 
 def _named(kind: Any, given: Mapping[str, Any], **keys: Any) -> Any:
@@ -111,7 +124,7 @@ def _named(kind: Any, given: Mapping[str, Any], **keys: Any) -> Any:
         elif field.name in given:
             made = field.default_factory
             keys[field.name] = field.default if made is MISSING else made()
-    return _class_of(kind)(keys)
+    return kind(keys)
 
 
 def batch_names(seeds: int, size: int) -> list[str]:
