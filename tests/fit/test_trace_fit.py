@@ -10,9 +10,9 @@ from biogrip.arrays import Array
 from biogrip.fit import trace_fit
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import identify_from
-from biogrip.fit.noise_model_fit import FAR
 from biogrip.fit.problem import Fit, TraceProblem
 from biogrip.fit.trace_fit import TraceFit, _alike, gripper_functions
+from biogrip.levels import OUTLYING
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.noise import AR1, Drift, Noise, NoiseModel, Outliers, add_noise
 from biogrip.physics.simulation import simulated_response
@@ -104,7 +104,7 @@ def test_noise_is_found_and_said() -> None:
     assert fit.noise_model.ar1 + fit.noise_model.flicker == pytest.approx(0.5, abs=0.25)
     away = np.abs(noisy(noise) - noisy(replace(noise, outliers=None))) / (0.02 * CLEAN.max())
     # What is only just outside of the noise may be missed, or not.
-    assert set(np.flatnonzero(away > 2 * FAR)) <= set(np.flatnonzero(fit.outliers))
+    assert set(np.flatnonzero(away > 2 * OUTLYING)) <= set(np.flatnonzero(fit.outliers))
     assert np.count_nonzero(fit.outliers & (away == 0)) <= 1
     model, outliers = fit.notes()
     assert "correlated over some" in model

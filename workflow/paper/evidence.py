@@ -14,9 +14,9 @@ from scipy.special import chdtri
 
 from biogrip.digits import counted
 from biogrip.fit.genome import nearest_encodable
-from biogrip.judging.levels import DETERMINED_PERCENT
 from biogrip.judging.likelihood import bounds_percent
 from biogrip.judging.quantities import Quantity
+from biogrip.levels import DETERMINED_PERCENT
 from biogrip.physics import gripper as actuator
 from biogrip.physics.protocol import sample_times
 from biogrip.records.traces import read_measurements

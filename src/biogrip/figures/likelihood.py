@@ -18,7 +18,7 @@ from biogrip.arrays import Array
 from biogrip.digits import SUPERSCRIPTS, with_unit
 from biogrip.figures import style
 from biogrip.figures.fit import first_seeds, seeds_in_words
-from biogrip.judging.levels import CERTAIN
+from biogrip.levels import CERTAIN
 from biogrip.records.identifications import read_identifications, read_verdicts
 from biogrip.study.study import Case
 from biogrip.tables.cases import target_of

@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray
 from biogrip.digits import plain
 from biogrip.fit.least_squares import LeastSquaresSettings, fit_from, identify_many
@@ -219,10 +220,6 @@ def is_within(parameters: Array, problem: TraceProblem) -> bool:
     return bool(np.all((x >= problem.low) & (x <= problem.high)))
 
 
-WORTH_A_MENTION, STRONG = 2.0, 6.0
-"""Differences of BIC from which on a simpler model is preferred, and any other."""
-
-
 @dataclass(frozen=True)
 class FittedModel:
     """A sample model fitted to a trace."""
@@ -269,7 +266,8 @@ def _own_and_best(tried: Sequence[FittedModel], chosen: str) -> tuple[FittedMode
     own = next(each for each in tried if each.candidate == chosen)
     best = min(tried, key=lambda each: each.delta_bic)
     simpler = len(best.model.names) < len(own.model.names)
-    return own, best if own.delta_bic >= (WORTH_A_MENTION if simpler else STRONG) else own
+    needed = levels.WORTH_A_MENTION if simpler else levels.STRONG
+    return own, best if own.delta_bic >= needed else own
 
 
 def preferred(tried: Sequence[FittedModel], chosen: str) -> str | None:
@@ -284,7 +282,7 @@ def preferred_simpler(tried: Sequence[FittedModel], chosen: str) -> str | None:
     more = len(own.model.names) - len(best.model.names)
     # Difference of n ln(misfit^2), which leaves the number of parameters aside.
     worse = own.delta_aic - best.delta_aic - 2 * more
-    return best.candidate if more > 0 and worse <= WORTH_A_MENTION else None
+    return best.candidate if more > 0 and worse <= levels.WORTH_A_MENTION else None
 
 
 def fits_far_better(tried: Sequence[FittedModel], chosen: str) -> bool:

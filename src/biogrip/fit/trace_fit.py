@@ -11,6 +11,7 @@ from functools import partial
 
 import numpy as np
 
+import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray
 from biogrip.digits import counted, rounded
 from biogrip.fit.experiment import Experiment, pose
@@ -72,7 +73,6 @@ _ROUNDS = 5
 _CONVERGED = 1e-2
 # The same of a fit that moves by less, in standard deviations.
 _STAYED = 0.03
-_WORTH_SAYING = 0.005
 
 Find = Callable[[Sequence[TraceProblem]], list[Fit]]
 """Function that finds the global optima of problems."""
@@ -119,7 +119,9 @@ class TraceFit:
             f"that grows with the {read}": noise_model.proportional,
         }
         parts = [f"{100 * noise_model.white:.0f} % white"]
-        parts += [f"{100 * n:.0f} % {what}" for what, n in others.items() if n >= _WORTH_SAYING]
+        parts += [
+            f"{100 * n:.0f} % {what}" for what, n in others.items() if n >= levels.WORTH_SAYING
+        ]
         said = [
             f"Noise model: of the variance {', '.join(parts)};{self.fitted_along} "
             "the intervals allow for all of it."

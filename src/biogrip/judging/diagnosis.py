@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+import biogrip.levels as levels
 from biogrip.arrays import Array
 from biogrip.digits import plain
 from biogrip.fit.experiment import Experiment
@@ -25,7 +26,6 @@ from biogrip.fit.least_squares import fit_from
 from biogrip.fit.nested_fits import FittedModels
 from biogrip.fit.problem import Fit, TraceProblem
 from biogrip.fit.trace_fit import TraceFit
-from biogrip.judging import levels
 from biogrip.judging.doubts import (
     DOUBT,
     HARMLESS,

@@ -23,10 +23,10 @@ from statistics import NormalDist
 
 import numpy as np
 
+import biogrip.levels as levels
 from biogrip.arrays import Array
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.problem import TraceProblem
-from biogrip.judging import levels
 from biogrip.judging.quantities import Quantity, parameters_and_sum
 from biogrip.physics.modes import linear_responses
 from biogrip.physics.noise import Noise, standard_deviation

@@ -25,10 +25,10 @@ from typing import Any
 
 import numpy as np
 
+import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.digits import round_increase, rounded
 from biogrip.fit.least_squares import FAIR, FINE, alike
-from biogrip.judging import levels
 from biogrip.judging.constrained_fits import CLOSE, ConstrainedFits
 from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.quantities import Quantity
@@ -109,7 +109,7 @@ class Points:
     def _deepen(self, limits: IntArray) -> None:
         """Fit limits above the threshold from the ends of all profiles, and their neighbours."""
         profile = self.profile[limits]
-        missed = self.increases[limits] > _CLEARLY * self.fits.threshold[profile]
+        missed = self.increases[limits] > levels.GAP * self.fits.threshold[profile]
         limits, profile = limits[missed], profile[missed]
         if not len(limits):
             return
@@ -150,8 +150,6 @@ _POINTS = 35
 # Points closer to the optimum than this are left out.
 _APART = 1e-9
 _ACCURACY = 1e-5
-# Factor by which a gap exceeds the threshold: fits give chi^2 with an error of about 0.01.
-_CLEARLY = 1.01
 
 
 @dataclass(frozen=True)
@@ -327,7 +325,7 @@ def find_gaps(
     roots = np.sqrt(np.maximum(increases, 0.0))
     found = []
     for start, end in pairwise(np.flatnonzero(increases < threshold).tolist()):
-        if end > start + 1 and increases[start + 1 : end].max() > _CLEARLY * threshold:
+        if end > start + 1 and increases[start + 1 : end].max() > levels.GAP * threshold:
             # Places for `np.interp` ascend from inside to outside.
             sides = [start, start + 1], [end, end - 1]
             first, last = (np.interp(np.sqrt(threshold), roots[of], log_values[of]) for of in sides)

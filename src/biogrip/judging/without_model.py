@@ -34,10 +34,10 @@ from typing import Any
 import numpy as np
 from scipy.special import chdtrc, chdtri, fdtri
 
+import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray
 from biogrip.digits import plain, with_limits
 from biogrip.fit.any_sample import AnySampleFit, Lags, count_lags, fit_any_sample
-from biogrip.judging import levels
 from biogrip.judging.verdicts import verdict_of
 from biogrip.judging.whiteness import as_correlated, correlated
 from biogrip.physics.residuals import Residuals
@@ -52,16 +52,10 @@ _WEIGHT, _ROUGH, _ACCURATE, _CLOSE, _FLAT = 300.0, 0.3, 0.02, 1e-3, 0.03
 _MOST_FITS, _LARGER, _MOST_DIVISIONS = 25, 4.0, 4
 # Least ratio of a time to the first, and of the last to it, for slopes and moduli.
 _INNER = 2.0
-# A limit hangs on what hardly shows if a noise of that changes the quantity so many times more.
-_HANGS = 10.0
 # Standard deviation of a quantity that counts as none, over the largest that a noise of one lag
 # makes; and a quantity that does, over its standard deviation.
 _LEAST, _ROUNDING = 1e-3, 1e-15
 
-# Share of a value below which a lower limit says no more than that it is positive.
-_LITTLE = 0.01
-# Ratio beyond which an upper limit hangs on the fastest lag that is tried, and is not sought.
-_MOST = 1e4
 # Of moduli, compliances, their slopes, and viscosities: N and m, or Pa.
 _UNITS = {
     "N/m": ("N/m", "m/N", "m/(N s)", "N s/m"),
@@ -266,10 +260,11 @@ def _told(fit: AnySampleFit, quantity: _Quantity, root: Callable[[int], float]) 
     if (turned := quantity.turned) is not None:
         value, *ends = (turned(it) if it else None for it in (value, *ends[::-1]))
     low, high = (float(end) if end is not None and end > 0 else None for end in ends)
-    if quantity.below is not None and max(value or 0.0, high or 0.0) > _MOST:
+    if quantity.below is not None and max(value or 0.0, high or 0.0) > levels.OF_THE_FASTEST:
         value, high = None, None
     # Of a flow that is hardly there the value is any.
-    little = 0.0 if quantity.kind == FLOW else _LITTLE * max(value or 0.0, _LITTLE * (high or 0.0))
+    largest = max(value or 0.0, levels.LITTLE * (high or 0.0))
+    little = 0.0 if quantity.kind == FLOW else levels.LITTLE * largest
     if low is not None and low < little:
         low = None
     value = None if low is None or high is None or value is None else float(value)
@@ -294,9 +289,9 @@ class _Profile:
         deviation = deviation if deviation > _LEAST * clearly else clearly
         stride = root(0) * deviation / (divisor or 1.0)
         # Of a liquid the modulus that another is divided by may vanish.
-        self._stride = min(stride, _MOST) if quantity.below else stride
+        self._stride = min(stride, levels.OF_THE_FASTEST) if quantity.below else stride
         self._deviation, self._divisor = deviation, divisor
-        self._open = [it for it in (-1, 1) if np.any(it * row[faint] > _HANGS * clearly)]
+        self._open = [it for it in (-1, 1) if np.any(it * row[faint] > levels.HANGS * clearly)]
 
     def limit(self, side: int) -> float | None:
         """Find the limit on a side, -1 or 1, if there is one."""

@@ -6,6 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
+import biogrip.levels as levels
 from biogrip.arrays import Array, parts
 from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import Gripper
@@ -15,7 +16,6 @@ from biogrip.physics.noise import estimate_noise, measure_rounding
 from biogrip.physics.protocol import Course
 from biogrip.physics.sample_model import Network, SampleModel
 from biogrip.physics.simulation import (
-    VISIBLE,
     Grip,
     Ring,
     compute_grip,
@@ -220,7 +220,7 @@ class Residuals:
         shown = self.trace.condensed.cleared(change) / noise_sd
         latest_first = np.argsort(-elapsed, kind="stable")
         norms = np.sqrt(np.cumsum(shown[latest_first] ** 2))
-        visible = np.flatnonzero(norms > VISIBLE)
+        visible = np.flatnonzero(norms > levels.VISIBLE)
         if not len(visible):
             return None
         return Ring(float(np.max(np.abs(shown))), float(elapsed[latest_first[visible[0]]]))

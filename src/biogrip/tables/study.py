@@ -9,10 +9,10 @@ from scipy.special import betaincinv
 
 from biogrip.fit.nested_fits import aic_and_bic
 from biogrip.fit.problem import METHODS
-from biogrip.judging.levels import WIDE
 from biogrip.judging.likelihood import bound
 from biogrip.judging.quantities import Quantity, parameters_and_sum
 from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
+from biogrip.levels import WIDE
 from biogrip.physics.noise import standard_deviation
 from biogrip.records.identifications import (
     ENCODABLE,
