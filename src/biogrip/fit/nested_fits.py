@@ -115,8 +115,7 @@ def fit_models(
         found[name] = {}
         if which:
             posed, random = [problems[name][it] for it in which], [rngs[name][it] for it in which]
-            given = posed, own, random, silent, further
-            fits = deepen(posed, identify_many(*given, to_last_digits=False))
+            fits = deepen(posed, identify_many(posed, own, random, silent, further))
             found[name] = dict(zip(which, fits, strict=True))
         done()
     _fit_again(problems, found)

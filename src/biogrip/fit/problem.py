@@ -64,13 +64,13 @@ class Fit:
     generations: int
     """Number of steps: generations, or local fits."""
     evaluations: int
-    """Number of simulated responses, with derivatives or not, but for the last Newton steps."""
+    """Number of simulated responses, with derivatives or not."""
     stop_reason: str
     """Reason why the method stopped."""
     history: History = field(repr=False)
     """Course of the identification; that of what was fitted first, where more fits followed."""
     converged: bool = True
-    """False if the final Newton refinement of the optimum did not converge."""
+    """False if the last local fit did not converge."""
 
     def at(self, fit: Minima) -> "Fit":
         """Return a copy with the optimum of a local fit of this trace alone."""

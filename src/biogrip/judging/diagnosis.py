@@ -67,7 +67,7 @@ class Diagnosis:
     lowest: Array | None = None
     """Log-parameters at which profiles or valley come below the best fit."""
     converged: bool = True
-    """False if the best fit has not converged to its last digits."""
+    """False if the best fit has not converged."""
     grip: Grip | None = None
     """Force of the jaws on the sample of the best fit."""
     notes: list[Note] = field(default_factory=list)
@@ -250,8 +250,8 @@ def _with_notes(judged: Diagnosis, of_rest: list[Note]) -> Diagnosis:
     notes += _pulling(grip, residuals.duration_s)
     if not judged.converged:
         text = (
-            "The fit has not converged to its last digits: further Newton steps increase "
-            "chi-squared. Rely on its verdicts, not on its digits."
+            "The fit has not converged: more steps would lower chi-squared a little. Rely on its "
+            "verdicts, not on its digits."
         )
         notes.append(Note(DOUBT, text))
     notes += _ringing(judged, rejected=compute_status(notes) == REJECTED)

@@ -1,6 +1,6 @@
 """Residuals of a model against one trace, with exact derivatives by the log-parameters."""
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable
 from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
 
@@ -11,7 +11,7 @@ from biogrip.arrays import Array, parts
 from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import Instrument
-from biogrip.physics.modes import compute_modes, linear_responses, sum_of_modes
+from biogrip.physics.modes import compute_modes, linear_responses
 from biogrip.physics.noise import estimate_noise, measure_rounding
 from biogrip.physics.protocol import Course
 from biogrip.physics.sample_model import Network, SampleModel
@@ -26,8 +26,6 @@ from biogrip.physics.simulation import (
 
 # Most numbers in the rows that are formed at once.
 _NUMBERS_AT_ONCE = 100_000
-# Most responses of modes at readings that a gradient to all digits takes.
-_MOST_NUMBERS = 100_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,33 +149,6 @@ class Residuals:
     def response(self, log_parameters: Array) -> Array:
         """Return the simulated response, neither cleared nor whitened, (n_samples,)."""
         return self._simulated(log_parameters)[0]
-
-    def gradients(
-        self, log_parameters: Array, others: Sequence["Residuals"]
-    ) -> tuple[Array, Array]:
-        """Compute gradients of half the sums of squares, and misfits, to all digits.
-
-        Log-parameters are (n, n_parameters); for each there are residuals that share the responses,
-        of the trace to compare with. Gradients are (n, n_parameters), root mean squares (n,).
-
-        Condensed rows have errors of 1e-14 of the response. Of what a trace hardly tells, these
-        move the optimum by 1e-7 and make its last digits those of a processor. So sums run over all
-        readings, unless there are too many of them.
-        """
-        n, parameters = log_parameters.shape
-        sums = np.empty((n, 1 + parameters))
-        for some in parts(n, max(1, _NUMBERS_AT_ONCE // (self.samples * (1 + parameters)))):
-            given = self.gripper, self.model, self.course, np.exp(log_parameters[some])
-            modes, condensed = compute_modes(*given), self.trace.condensed
-            if modes.rates.shape[1] * self.samples <= _MOST_NUMBERS:
-                rows = condensed.cleared(sum_of_modes(modes, self.course, self.trace.time_s))
-                rows[:, 0] -= [other.trace.cleared for other in others[some]]
-            else:
-                rows = condensed.of_modes(modes)
-                rows[:, 0] -= [other.trace.rows for other in others[some]]
-            # One product per sample: the order of its sums does not depend on their number.
-            sums[some] = (rows @ np.ascontiguousarray(rows[:, 0])[:, :, None])[:, :, 0]
-        return sums[:, 1:], np.sqrt(sums[:, 0] / self.samples)
 
     def condensed_responses(self, log_parameters: Array, *, slopes: bool = True) -> Array:
         """Compute rows of responses and, if wanted, their slopes, (n, 1 + n_parameters, n_rows)."""
