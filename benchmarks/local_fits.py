@@ -115,10 +115,10 @@ study does, all starts of all traces. The others drive the same residuals and Ja
 the same rows, one fit after the other and each to its own default tolerance
 (`benchmarks/fit_peers.py`): SciPy's trust region (trf), and lmfit's Levenberg-Marquardt (leastsq,
 bounds by its transformation, Dfun). *In two turns*, SciPy is spared what biogrip is spared: rough
-fits, and the best {FINISHED} to the end. What is done once for all traces, and the starting points, are not included. All but the batch are timed
-on its first {_FEW} traces, and times are those of one. The last column, over all {BATCH}:
-chi^2 = n (m/m_best)^2, n the samples and m_best the lowest misfit that any of them found, above its
-smallest value.""",
+fits, and the best {FINISHED} to the end. What is done once for all traces, and the starting points,
+are not included. All but the batch are timed on its first {_FEW} traces, and times are those of
+one. The last column, over all {BATCH}: chi^2 = n (m/m_best)^2, n the samples and m_best the lowest
+misfit that any of them found, above its smallest value.""",
     {
         "library": lambda row: row["library"],
         "time a trace (ms)": lambda row: number(row["time_ms"]),

@@ -133,8 +133,8 @@ def minimize(
 
     Starts and bounds, (n, n_parameters), are logarithms; equal bounds fix a parameter. A problem
     has converged when the actual and the predicted relative decrease of its sum are below the
-    tolerance. Damping is relative to the diagonal of the information or, if it is
-    even, in units of the sum of squares.
+    tolerance. Damping is relative to the diagonal of the information or, if it is even, in units of
+    the sum of squares.
     """
     everyone, count = np.arange(len(starts)), len(starts)
     never = np.full(count, np.inf), np.ones(count, dtype=np.int64), np.zeros(count, dtype=bool)
