@@ -14,7 +14,7 @@ from benchmarks.report import Section, number, times_ours
 from benchmarks.timing import Timed, alternate
 from biogrip.arrays import Array
 from biogrip.fit.least_squares import FINISHED, best_of_starts, screened
-from biogrip.fit.problem import Row, TraceProblem, silent
+from biogrip.fit.problem import HistoryRow, TraceProblem, silent
 
 _ROUNDS, _FEW = 5, 3
 
@@ -32,7 +32,7 @@ class Started:
     problem: TraceProblem
     starts: Array
     """Log-parameters, (n_starts, n_parameters)."""
-    before: Row
+    before: HistoryRow
     """First row of the history, see `best_of_starts`."""
 
 

@@ -11,7 +11,7 @@ from biogrip.fit import trace_fit
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import identify_from
 from biogrip.fit.problem import Fit, TraceProblem
-from biogrip.fit.trace_fit import TraceFit, _alike, gripper_functions
+from biogrip.fit.trace_fit import TraceFit, _has_settled, gripper_functions
 from biogrip.levels import OUTLYING
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.noise import AR1, Drift, Noise, NoiseModel, Outliers, add_noise
@@ -54,9 +54,9 @@ def noisy(noise: Noise, seed: int = 0) -> Array:
 def test_noise_models_are_alike_if_shares_and_times_are() -> None:
     """Of a time, its logarithm counts, by its share."""
     one = NoiseModel(0.5, 20.0, 0.1)
-    assert _alike(one, replace(one, time_s=20.3, flicker=0.102))
-    assert not _alike(one, replace(one, time_s=20.5))
-    assert not _alike(one, replace(one, flicker=0.111))
+    assert _has_settled(one, replace(one, time_s=20.3, flicker=0.102))
+    assert not _has_settled(one, replace(one, time_s=20.5))
+    assert not _has_settled(one, replace(one, flicker=0.111))
 
 
 def test_white_noise_and_a_known_gripper_leave_the_fit_as_it_is() -> None:

@@ -17,7 +17,7 @@ from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.modes import linear_responses
 from biogrip.physics.noise import nuisance_basis, within, without
 from biogrip.physics.protocol import Course, Phase, hold, join_phases, sample_times
-from biogrip.physics.residuals import Residuals, Trace
+from biogrip.physics.residuals import CondensedTrace, Residuals
 from biogrip.physics.response import step_response, superpose
 from biogrip.physics.sample_model import SampleModel, with_fixed
 from biogrip.physics.simulation import simulated_response
@@ -51,7 +51,7 @@ def assert_alike(residuals: Residuals, x: Array) -> int:
 
 
 def posed(gripper: Gripper, model: SampleModel, rows: Condensed, trace: Array) -> Residuals:
-    return Residuals(gripper, model, rows.course, Trace(trace, rows), instrument=GRIPPER)
+    return Residuals(gripper, model, rows.course, CondensedTrace(trace, rows), instrument=GRIPPER)
 
 
 def noise(count: int) -> Array:

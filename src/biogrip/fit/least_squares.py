@@ -23,7 +23,7 @@ from pydantic import Field
 from biogrip.arrays import Array, BoolArray, IntArray, parts
 from biogrip.errors import BiogripError
 from biogrip.fit.levenberg_marquardt import Constraint, Minima, Normal, minimize
-from biogrip.fit.problem import Fit, History, Progress, Row, TraceProblem, silent
+from biogrip.fit.problem import Fit, History, HistoryRow, ReportProgress, TraceProblem, silent
 from biogrip.keys import Block
 
 PRIOR_WIDTH = 100.0
@@ -157,7 +157,7 @@ def identify_many(
     problems: Sequence[TraceProblem],
     settings: LeastSquaresSettings,
     rngs: Sequence[np.random.Generator],
-    progress: Progress = silent,
+    progress: ReportProgress = silent,
     further: Sequence[Array] | None = None,
 ) -> list[Fit]:
     """Identify samples by local fits from the best of many random points.
@@ -175,7 +175,7 @@ def identify_many(
 
 def screened(
     problem: TraceProblem, settings: LeastSquaresSettings, rng: np.random.Generator
-) -> tuple[Array, Row]:
+) -> tuple[Array, HistoryRow]:
     """Return the best random points as starts, and the first row of the history."""
     shape = (settings.candidates, len(problem.low))
     points = rng.uniform(problem.low, problem.high, shape)
@@ -196,8 +196,8 @@ def screened(
 def best_of_starts(
     problems: Sequence[TraceProblem],
     starts: Sequence[Array],
-    before: Sequence[Row],
-    progress: Progress,
+    before: Sequence[HistoryRow],
+    progress: ReportProgress,
 ) -> list[Fit]:
     """Fit every trace from each of its starts and return the optima of lowest misfit.
 
@@ -213,7 +213,7 @@ def best_of_starts(
         best = fits.in_order(fine[winners])
         for own, index in enumerate(group.tolist()):
             rows = _descents(rough[trace == own], before[index])
-            finished = _responses(fine)[trace_of_fine == own].sum()
+            finished = _count_responses(fine)[trace_of_fine == own].sum()
             misfit, evaluations = float(best.misfit[own]), rows[-1][3] + int(finished)
             rows[-1] = np.exp(best.x[own]), misfit, misfit, evaluations
             progress(evaluations, misfit)
@@ -242,10 +242,10 @@ def _best(found: Minima, which: BoolArray, count: int) -> IntArray:
     return chosen[order[:count]]
 
 
-def _descents(found: Minima, before: Row) -> list[Row]:
+def _descents(found: Minima, before: HistoryRow) -> list[HistoryRow]:
     """Return the rows of a history: the given first one, and one for each fit."""
     rows, evaluations, best, ordered = [before], before[3], 0, list[float]()
-    ranks, responses = found.misfit.astype(np.float32), _responses(found)
+    ranks, responses = found.misfit.astype(np.float32), _count_responses(found)
     for fit, misfit in enumerate(found.misfit.tolist()):
         evaluations += int(responses[fit])
         best = fit if ranks[fit] < ranks[best] else best
@@ -255,7 +255,7 @@ def _descents(found: Minima, before: Row) -> list[Row]:
     return rows
 
 
-def _responses(found: Minima) -> IntArray:
+def _count_responses(found: Minima) -> IntArray:
     """Return how many responses fits have computed: a linearisation is one and its derivatives."""
     return found.evaluations * (1 + found.x.shape[1])
 

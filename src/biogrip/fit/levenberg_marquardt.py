@@ -32,9 +32,9 @@ from biogrip.arrays import Array, BoolArray, IntArray
 _FIRST_DAMPING, _LEAST_DAMPING = 1e-2, 1e-9
 # In e-folds. Linearised responses are wrong for longer steps, which would waste starts.
 _LONGEST_STEP = 3.0
-_MOST_STEPS = 1000
+_MOST_ITERATIONS = 1000
 _STANDSTILL = 1e-8
-_SMALLEST = 1e-300
+_LEAST_INFORMATION = 1e-300
 # Ratios of actual to predicted decrease are rounded to multiples of one over this.
 _RATIOS = 256
 # Grid spacing, in standard deviations of a parameter with all others known; and its maximum.
@@ -125,7 +125,7 @@ def minimize(
     high: Array,
     tolerance: float,
     constraint: Constraint | None = None,
-    most_steps: int = _MOST_STEPS,
+    most_steps: int = _MOST_ITERATIONS,
     *,
     even: bool = False,
 ) -> Minima:
@@ -208,7 +208,7 @@ def _on_grid(x: Array, state: _State) -> Array:
 def _size(information: Array) -> Array:
     """Return the diagonals of matrices, (n, n_parameters), never zero."""
     # A parameter without any effect must not divide by zero.
-    return np.abs(np.diagonal(information, axis1=1, axis2=2)) + _SMALLEST
+    return np.abs(np.diagonal(information, axis1=1, axis2=2)) + _LEAST_INFORMATION
 
 
 def _bounded_step(normal: Normal, damping: Array, below: Array, above: Array) -> Array:

@@ -21,11 +21,11 @@ from biogrip.fit.levenberg_marquardt import Minima
 from biogrip.physics.residuals import Residuals
 from biogrip.physics.sample_model import SampleModel
 
-Progress = Callable[[int, float], None]
+ReportProgress = Callable[[int, float], None]
 """Callback that receives the number of simulated responses and the lowest misfit."""
 
 
-Row = tuple[Array, float, float, int]
+HistoryRow = tuple[Array, float, float, int]
 """Row of a history: best parameters so far, lowest and median misfit, evaluations so far."""
 
 
@@ -47,7 +47,7 @@ class History:
     """Responses simulated so far, (n_steps + 1,)."""
 
     @classmethod
-    def of(cls, rows: Sequence[Row]) -> "History":
+    def of(cls, rows: Sequence[HistoryRow]) -> "History":
         """Assemble a history from its rows."""
         parameters, best_misfit, median_misfit, counts = map(np.array, zip(*rows, strict=True))
         return cls(best_misfit, median_misfit, parameters, counts)
@@ -171,7 +171,9 @@ METHODS: dict[str, Method] = {
     )
 }
 
-Identify = Callable[[Sequence[TraceProblem], Sequence[np.random.Generator], Progress], list[Fit]]
+Identify = Callable[
+    [Sequence[TraceProblem], Sequence[np.random.Generator], ReportProgress], list[Fit]
+]
 """Identifies traces as the ``identify_many`` of a method does, with its settings."""
 
 
@@ -180,7 +182,9 @@ def identifier(name: str, settings: object) -> Identify:
     module = import_module(f"{__package__}.{name}")
 
     def identify(
-        problems: Sequence[TraceProblem], rngs: Sequence[np.random.Generator], progress: Progress
+        problems: Sequence[TraceProblem],
+        rngs: Sequence[np.random.Generator],
+        progress: ReportProgress,
     ) -> list[Fit]:
         answers = module.identify_many(problems, settings, rngs, progress)
         pairs = zip(problems, answers, strict=True)

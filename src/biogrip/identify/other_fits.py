@@ -36,7 +36,7 @@ from biogrip.fit.nested_fits import (
     within_range,
 )
 from biogrip.fit.noise_model_fit import absorbed, compare_extremes, growth_left
-from biogrip.fit.problem import Fit, Progress, TraceProblem, silent
+from biogrip.fit.problem import Fit, ReportProgress, TraceProblem, silent
 from biogrip.fit.trace_fit import TraceFit, fit_least_squares
 from biogrip.identify.prepare import flow_of, for_trace
 from biogrip.judging.diagnosis import Diagnosis, diagnose
@@ -71,7 +71,7 @@ Trace = tuple[Recording, Experiment]
 """A recording and the experiment that it is of, as `prepare` returns them."""
 
 
-def fits_of(traces: Sequence[Trace], progress: Progress) -> list[TraceFit]:
+def fits_of(traces: Sequence[Trace], progress: ReportProgress) -> list[TraceFit]:
     """Return the fits that judgements of traces with the same model and budget are based on."""
     experiments = [experiment for _, experiment in traces]
     rngs = [experiment.stream("identifiability") for experiment in experiments]

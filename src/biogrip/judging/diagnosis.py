@@ -43,13 +43,13 @@ from biogrip.judging.likelihood import Likelihood, check_rows, make_likelihood
 from biogrip.judging.profiles import compute_valley
 from biogrip.judging.quantities import characteristic_times, parameters_and_sum
 from biogrip.judging.verdicts import DETERMINED, Finding, Trade, compute_findings, find_trade_offs
-from biogrip.judging.without_model import KINDS, WithoutModel, decades, tell_without_model
+from biogrip.judging.without_model import KINDS, WithoutModel, tell_without_model, times_told
 from biogrip.physics.sample_model import C_P
 from biogrip.physics.simulation import Grip
 from biogrip.traces.reader import Recording
 
 # Widening of a range, and the start beyond its end, in e-folds; and rounding.
-_WIDER, _BEYOND, _AT_END = np.log(1e3), 1.0, 1e-9
+_RANGE_WIDENING, _START_BEYOND, _AT_RANGE_END = np.log(1e3), 1.0, 1e-9
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ class Diagnosis:
         tell = partial(tell_without_model, confidence=self.likelihood.confidence, kinds=kinds)
         found = tell(residuals, at_s=at_s)
         if self.onset_limits_s:
-            starts, times = map(residuals.later, self.onset_limits_s), decades(*found.covered_s)
+            starts, times = map(residuals.later, self.onset_limits_s), times_told(*found.covered_s)
             found = found.widened([tell(start, at_s=at_s or times) for start in starts])
         beyond_noise = found.misfit**2 - residuals.noise_scale**2
         far_off = beyond_noise > (levels.FAR_OFF * residuals.peak) ** 2
@@ -276,11 +276,11 @@ def _range_ends(likelihood: Likelihood) -> Iterator[Note]:
         for end, outward, word in ((problem.low, -1.0, "lower"), (problem.high, 1.0, "upper")):
             # An exponent at its upper end is that of a damper: there is nothing beyond.
             bounded = outward > 0 and np.isfinite(parameter.below)
-            if bounded or abs(x[index] - end[index]) > _AT_END:
+            if bounded or abs(x[index] - end[index]) > _AT_RANGE_END:
                 continue
             start, low, high = x.copy(), problem.low.copy(), problem.high.copy()
-            start[index] += outward * _BEYOND
-            (low if outward < 0 else high)[index] += outward * _WIDER
+            start[index] += outward * _START_BEYOND
+            (low if outward < 0 else high)[index] += outward * _RANGE_WIDENING
             wider = fit_from([replace(problem, low=low, high=high)], start, roughly=True)
             if likelihood.increase(float(wider.misfit[0])) < -levels.BEYOND_THE_RANGE:
                 unit = f" {parameter.unit}" if parameter.unit else ""

@@ -41,9 +41,9 @@ _COMPLEX_STEP = 1e-30
 # Rate at which a bare damper forgets, in 1/s; its force is c times the rate of the deformation.
 _RATE_OF_A_DAMPER = 1e30
 # Numbers formed together, which should fit a processor's cache.
-_NUMBERS_AT_ONCE = 400_000
+_MODE_NUMBERS_AT_ONCE = 400_000
 # Phases, and steps of a recursion, that are taken one by one.
-_FEW = 50
+_MOST_ONE_BY_ONE = 50
 
 
 class Modes(NamedTuple):
@@ -83,7 +83,7 @@ def sum_of_modes(modes: Modes, course: Course, time_s: Array) -> Array:
     by_slope[:, 1:] = modes.weights[:, None] * modes.rate_slopes
     mixing = np.concatenate((by_response, by_slope), axis=2)
     rows = np.zeros((n, 1 + count, len(time_s)))
-    for some in parts(n, max(1, _NUMBERS_AT_ONCE // (m * len(time_s)))):
+    for some in parts(n, max(1, _MODE_NUMBERS_AT_ONCE // (m * len(time_s)))):
         for here, both in responses_in_turn(modes.rates[some], course, time_s):
             # One product per sample: the order of its sums does not depend on their number.
             rows[some, :, here] = mixing[some] @ np.concatenate(both, axis=1)
@@ -208,7 +208,7 @@ def responses_in_turn(
     if course.sweeps:
         yield slice(None), moduli_of_modes(rates, time_s)[: 1 + slopes]
         return
-    at_once = max(1, _NUMBERS_AT_ONCE // max(rates.size, 1))
+    at_once = max(1, _MODE_NUMBERS_AT_ONCE // max(rates.size, 1))
     lengths = np.diff(course.time_s, append=course.end_s)
     # What precedes a step is read at its instant.
     firsts = np.append(time_s.searchsorted(course.time_s, side="right"), len(time_s))
@@ -278,7 +278,7 @@ class _Motion:
         """Return what remains of modes after times in phases, and what they gain in these."""
         at: Array = elapsed_s
         same: IntArray | slice = slice(None)
-        if len(self._powers) > _FEW:
+        if len(self._powers) > _MOST_ONE_BY_ONE:
             # Rows at equal intervals are few different times apart.
             at, same = np.unique(elapsed_s, return_inverse=True)
         orders = np.flatnonzero(np.any(self._powers, axis=0))
@@ -294,7 +294,7 @@ class _Motion:
 def _recursion(first: Array, factors: Array, terms: Array) -> Array:
     """Return x_0 ... x_n, x_(k+1) = factors_k x_k + terms_k; many steps are taken in blocks."""
     count = terms.shape[-1]
-    block = int(np.sqrt(count)) if count > _FEW else 1
+    block = int(np.sqrt(count)) if count > _MOST_ONE_BY_ONE else 1
     blocks = -(-count // block)
     padding = [(0, 0)] * (terms.ndim - 1) + [(0, blocks * block - count)]
     scale, within = (

@@ -25,11 +25,11 @@ from biogrip.physics.simulation import (
 )
 
 # Most numbers in the rows that are formed at once.
-_NUMBERS_AT_ONCE = 100_000
+_MISFIT_NUMBERS_AT_ONCE = 100_000
 
 
 @dataclass(frozen=True, eq=False)
-class Trace:
+class CondensedTrace:
     """A trace, and the condensed rows that stand for it."""
 
     readings: Array
@@ -79,7 +79,7 @@ class Residuals:
     """Sample model."""
     course: Course
     """Protocol."""
-    trace: Trace
+    trace: CondensedTrace
     """The trace."""
     _: KW_ONLY
     instrument: Instrument
@@ -159,7 +159,7 @@ class Residuals:
     def misfit(self, parameters: Array) -> Array:
         """Compute RMS misfits, (n,), of parameters, (n, n_parameters), each by itself."""
         misfit = np.empty(len(parameters))
-        for some in parts(len(parameters), max(1, _NUMBERS_AT_ONCE // len(self.trace.rows))):
+        for some in parts(len(parameters), max(1, _MISFIT_NUMBERS_AT_ONCE // len(self.trace.rows))):
             responses = self.condensed_responses(np.log(parameters[some]), slopes=False)[:, 0]
             rows = responses - self.trace.rows
             misfit[some] = np.sqrt(np.einsum("nr,nr->n", rows, rows) / self.samples)

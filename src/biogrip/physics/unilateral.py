@@ -28,11 +28,11 @@ from biogrip.physics.sample_model import Network
 
 _MOST_EVENTS = 100_000
 # Share of the largest force and closing below which a change of contact is rounding.
-_LEAST_SHARE = 1e-11
+_LEAST_CHANGE = 1e-11
 # Time within which a sample without a parallel damper yields, for what is seen at once.
 _AT_ONCE_S = 1e-10
 # Growth of the distances in the grid on which the end of a stretch is bracketed.
-_GROWTH = 1.1
+_GROWTH_OF_TIMES = 1.1
 
 
 @dataclass(frozen=True)
@@ -73,8 +73,8 @@ def unilateral_response(
     )
     softest = min(arm.stiffness_Nm_per_rad for arm in (gripper.left, gripper.right))
     least = {
-        True: _LEAST_SHARE * most_torque / gripper.lever_m,
-        False: _LEAST_SHARE * 2 * gripper.lever_m * most_torque / softest,
+        True: _LEAST_CHANGE * most_torque / gripper.lever_m,
+        False: _LEAST_CHANGE * 2 * gripper.lever_m * most_torque / softest,
     }
     branches = network.k.shape[1]
     states = np.zeros((3 + branches, len(time_s)))
@@ -89,7 +89,7 @@ def unilateral_response(
             # The torques, counted from there on.
             shift = np.array([[1, 0, 0], [done, 1, 0], [done**2 / 2, done, 1]])
             stretch = go_on(state, torques @ shift)
-            grid = _grid(stretch.fastest_per_s, length - done)
+            grid = _growing_times(stretch.fastest_per_s, length - done)
             lasts = _first_below(stretch.margin, grid, least[touching])
             begin, end = start + done, start + (length if lasts is None else done + lasts)
             # A reading at its end is also the first of the next stretch, which takes its place.
@@ -122,7 +122,7 @@ def _loads(powers: Array, elapsed_s: Array) -> Array:
     return powers @ np.stack((np.ones_like(elapsed_s), elapsed_s, elapsed_s**2 / 2))
 
 
-class _Modes:
+class _StretchModes:
     """Modes of springs G, (n_springs, n_states), and dampers L, (n_states, n_states), lower."""
 
     def __init__(self, springs: Array, dampers: Array) -> None:
@@ -180,16 +180,16 @@ class _System:
         spring_rows = np.hstack((np.diag(np.sqrt(self._k)), np.zeros((2, n))))
         branches = np.sqrt(k)[:, None] * np.hstack((np.tile(tips, (n, 1)), -np.eye(n)))
         side = np.sqrt(k_p) * np.concatenate((tips, np.zeros(n)))
-        self._touching = _Modes(
+        self._touching = _StretchModes(
             np.vstack((spring_rows, side, branches)),
             _coupled(self._c, b * b * c_p, np.sqrt(c)),
         )
-        self._arms = _Modes(np.diag(np.sqrt(self._k)), np.diag(np.sqrt(self._c)))
+        self._arms = _StretchModes(np.diag(np.sqrt(self._k)), np.diag(np.sqrt(self._c)))
         # Springs of a sample without a parallel damper are in equilibrium but for so long.
         c_p = c_p or _AT_ONCE_S * (k_p + k.sum())
         own = np.concatenate(([np.sqrt(k_p)], np.zeros(n)))
         rest = np.sqrt(k)[:, None] * np.hstack((np.ones((n, 1)), -np.eye(n)))
-        self._sample = _Modes(np.vstack((own, rest)), np.diag(np.sqrt(np.append(c_p, c))))
+        self._sample = _StretchModes(np.vstack((own, rest)), np.diag(np.sqrt(np.append(c_p, c))))
 
     def in_contact(self, state: Array, torques: Array) -> _Stretch:
         """Solve from a state on, in contact."""
@@ -231,11 +231,11 @@ def _coupled(arms: Array, shared: float, diagonal: Array) -> Array:
     return whole
 
 
-def _grid(fastest_per_s: float, length_s: float) -> Array:
+def _growing_times(fastest_per_s: float, length_s: float) -> Array:
     """Return times from 0 to the end, at growing distances, (n_times,)."""
     first = min(1e-2 / fastest_per_s, length_s)
-    count = int(np.ceil(np.log(length_s / first) / np.log(_GROWTH))) + 1
-    growing = first * _GROWTH ** np.arange(count)
+    count = int(np.ceil(np.log(length_s / first) / np.log(_GROWTH_OF_TIMES))) + 1
+    growing = first * _GROWTH_OF_TIMES ** np.arange(count)
     return np.concatenate(([0.0], growing[growing < length_s], [length_s]), dtype=float)
 
 
