@@ -12,6 +12,7 @@ modulus is read, a hold of 1 needs no option.
 import csv
 import os
 import re
+import sys
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
@@ -27,24 +28,26 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.command.options import OPTIONS, Setting
 from biogrip.command.outputs import COLUMNS
+from biogrip.config.case import SampleCase
+from biogrip.config.experiment_blocks import LONGEST_S, SHORTEST_S
+from biogrip.config.loading import load, read_config_of, read_configs, trace_defaults
+from biogrip.config.messages import checked, with_numbers
+from biogrip.config.source import (
+    HOLD,
+    KeyPath,
+    Source,
+    dotted,
+    keys_in,
+    overlaid,
+    read_source,
+    value_of,
+)
+from biogrip.config.trace_blocks import TraceConfig
 from biogrip.digits import counted, plain
 from biogrip.errors import BiogripError, nearest
 from biogrip.identify.other_fits import Trace
 from biogrip.physics.instruments import GRIPPER, INSTRUMENTS, Instrument
 from biogrip.physics.models import ALIASES, CANDIDATES
-from biogrip.study.experiment_blocks import LONGEST_S, SHORTEST_S
-from biogrip.study.messages import checked, with_numbers
-from biogrip.study.source import (
-    HOLD,
-    KeyPath,
-    Source,
-    default_config,
-    dotted,
-    keys_in,
-    overlaid,
-    value_of,
-)
-from biogrip.study.study import Case, load_study, read_configs
 from biogrip.terminal import visible
 from biogrip.traces.columns import (
     held_unit,
@@ -128,7 +131,7 @@ class Asked:
 
         A sphere's force and indentation are what they count as.
         """
-        blocks = read_configs(self.configs)
+        blocks, _ = read_config_of(TraceConfig, self.configs)
         for setting in self.settings:
             blocks = _laid_over(blocks, setting)
         measured = _measured(blocks)
@@ -173,7 +176,7 @@ def _laid_over(blocks: dict[str, Any], setting: Setting) -> dict[str, Any]:
     return overlaid(blocks, value)
 
 
-def read_trace(asked: Asked) -> tuple[Recording, Case]:
+def read_trace(asked: Asked) -> tuple[Recording, SampleCase]:
     """Read a trace, and return it with the case that it is.
 
     A `BiogripError` has file, line and column, or setting, that cannot be used.
@@ -185,56 +188,42 @@ def read_trace(asked: Asked) -> tuple[Recording, Case]:
     return replace(recording, remarks_before=remarks_on_hold(recording, case, asked.given)), case
 
 
-def study_of(asked: Asked) -> tuple[str, dict[str, Any], Recording | None, Array | None]:
-    """Return the study of one case that a trace is, not checked, and the name of the case.
-
-    The trace comes along if its protocol follows from it, and what was controlled if it was
-    recorded.
-    """
-    given = asked.given
-    if len(found := [key for key in _PROTOCOLS if key in keys_in(given)]) > 1:
-        of_config = [*keys_in(read_configs(asked.configs))]
-        said = [".".join(key) + f" of {asked.config}" * (key in of_config) for key in found]
-        raise BiogripError(f"{asked.place}: found {' and '.join(said)}; allowed is one of them.")
-    merged = overlaid(read_configs([default_config()]), given)
-    merged, recording, record = _with_instrument(merged, given, asked)
-    # Cases and a table of the config are meant for the workflow.
-    for name in ("only", "traces"):
-        merged.pop(name, None)
-    name = re.sub(r"[^A-Za-z0-9_-]", "_", asked.trace.stem)[:60]
-    case = name if re.match("[A-Za-z]", name) else f"trace_{name}"
-    merged["cases"] = {case: {"sample": overlaid({"model": MODEL}, merged.pop("sample", {}))}}
-    return case, merged, recording, record
-
-
-def case_of(asked: Asked) -> tuple[Case, Recording | None]:
+def case_of(asked: Asked) -> tuple[SampleCase, Recording | None]:
     """Return the case that a trace is, and the trace if its protocol follows from it.
 
     A `BiogripError` has option, row, or file, line and key, if settings or config cannot be used.
     """
-    case, merged, recording, record = study_of(asked)
-    files = [default_config(), *asked.configs]
+    given = asked.given
+    _refuse_two_protocols(asked, given)
+    files = [trace_defaults(), *asked.configs]
+    merged = overlaid(read_configs([trace_defaults()]), given)
+    merged, recording, record = _with_instrument(merged, given, asked)
+    merged["sample"] = overlaid({"model": MODEL}, merged.get("sample", {}))
     known = {*keys_in(read_configs(files))}
-    sources = [_source(setting, known, merged, case) for setting in asked.settings]
-    try:
-        study = load_study(merged, files, over=sources)
-    except BiogripError as error:
-        _, *problems = str(error).replace(f"cases.{case}.", "").split("\n")
-        raise BiogripError("\n".join(problems)) from error
-    return replace(study.cases[case], record=record), recording
+    sources = [*map(read_source, files)]
+    sources += (_source(setting, known, merged) for setting in asked.settings)
+    config = load(TraceConfig, merged, sources)
+    name = re.sub(r"[^A-Za-z0-9_-]", "_", asked.trace.stem)[:60]
+    name = name if re.match("[A-Za-z]", name) else f"trace_{name}"
+    return SampleCase(name, config, config, record), recording
 
 
-def _source(setting: Setting, known: set[KeyPath], merged: Mapping[str, Any], case: str) -> Source:
+def _refuse_two_protocols(asked: Asked, given: Mapping[str, Any]) -> None:
+    if len(protocols := [key for key in _PROTOCOLS if key in keys_in(given)]) > 1:
+        of_config = [*keys_in(read_configs(asked.configs))]
+        said = [".".join(key) + f" of {asked.config}" * (key in of_config) for key in protocols]
+        raise BiogripError(f"{asked.place}: found {' and '.join(said)}; allowed is one of them.")
+
+
+def _source(setting: Setting, known: set[KeyPath], merged: Mapping[str, Any]) -> Source:
     """Return the keys that a setting is to be named for: its own, and blocks that it adds."""
     path: KeyPath = setting.path
-    if path[0] == "sample":
-        path = ("cases", case, *path)
     if path[0] == "measurement" and "sphere" in merged["measurement"]:
         path = (path[0], *(_BY_SPHERE.get(str(key), key) for key in path[1:]))
     held = {"protocol": merged["protocol"]}
-    own = keys_in(held) if path in (HOLD, LOAD) else keys_in(setting.value, path)
+    keys = keys_in(held) if path in (HOLD, LOAD) else keys_in(setting.value, path)
     above = [path[:length] for length in range(1, len(path)) if path[:length] not in known]
-    return setting.by, dict.fromkeys([*above, path, *own])
+    return setting.by, dict.fromkeys([*above, path, *keys])
 
 
 def _with_instrument(
@@ -341,6 +330,9 @@ def check_settings(traces: Sequence[Asked]) -> None:
 
     So are traces of different quantities. A `BiogripError` has the first few problems.
     """
+    for config in dict.fromkeys(file for asked in traces for file in asked.configs):
+        for note in read_config_of(TraceConfig, [config])[1]:
+            print(note, file=sys.stderr)
     read: dict[str, str] = {}
     problems: dict[str, None] = {}
     for own in traces:
@@ -405,7 +397,7 @@ def _meant(name: str, cells: Sequence[str]) -> str | None:
             number_and_unit(cell)
     except ValueError:
         return next((word for word in _OF_WORDS if _misspelt(plain, word)), None)
-    blocks = read_configs([default_config()])
+    blocks = read_configs([trace_defaults()])
     keys = [path for path in keys_in(blocks) if path[0] in _INSTRUMENT]
     known = {str(path[-1]): dotted(path) for path in keys} | dict.fromkeys(_HELD, "hold")
     known |= {each.controlled.column: "hold" for each in INSTRUMENTS.values()}
@@ -542,7 +534,7 @@ def _column_problems(
                 )
 
 
-def load_in_words(trace: Trace, case: Case, given: Mapping[str, Any]) -> str:
+def load_in_words(trace: Trace, case: SampleCase, given: Mapping[str, Any]) -> str:
     """Return what was held or loaded; nothing where a config has the protocol.
 
     Given are the blocks of the config that the user has set.
@@ -567,13 +559,13 @@ def load_in_words(trace: Trace, case: Case, given: Mapping[str, Any]) -> str:
     return f"Held: {what}{_contact(case)}."
 
 
-def _contact(case: Case) -> str:
+def _contact(case: SampleCase) -> str:
     """Return what turns a force and an indentation into a stress and a strain."""
     sphere = case.block.measurement.sphere
     return f", by Hertz's contact with a sphere of radius {sphere}" if sphere else ""
 
 
-def _shrinks(recording: Recording, case: Case) -> tuple[str, ...]:
+def _shrinks(recording: Recording, case: SampleCase) -> tuple[str, ...]:
     """Return a sentence if a sphere was drawn back, where Hertz's contact has no such sum."""
     if recording.load is None or case.block.measurement.sphere is None:
         return ()
@@ -592,7 +584,9 @@ def _with_unit(number: str, unit: str) -> str:
     return number if unit == "1" else f"{number} {unit}"
 
 
-def remarks_on_hold(recording: Recording, case: Case, given: Mapping[str, Any]) -> tuple[str, ...]:
+def remarks_on_hold(
+    recording: Recording, case: SampleCase, given: Mapping[str, Any]
+) -> tuple[str, ...]:
     """Return a sentence if a sphere was drawn back, or what was held may be in another unit.
 
     That is if readings have a unit with a prefix, and what was held is a number.
