@@ -43,7 +43,7 @@ def reference() -> str:
 
     Where the default config gives no default it is that of the class.
     """
-    defaults = read_configs(DEFAULTS)
+    defaults: Any = read_configs(DEFAULTS)
     sections: dict[str, list[tuple[str, ...]]] = {"General": []}
     for path, schema in leaves(STUDY).items():
         top, *inner = path.split(".")

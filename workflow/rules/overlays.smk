@@ -44,7 +44,8 @@ rule sweep:
 if STUDY.config.traces:
     # Imported here, for it loads much that a study without a table needs not.
     from biogrip.command.options import Setting
-    from biogrip.command.settings import check_settings, read_table
+    from biogrip.command.settings import check_settings
+    from biogrip.command.sheet import read_table
     from biogrip.config.loading import trace_defaults
 
     MODEL = Setting("traces.model", ("sample", "model"), STUDY.config.traces.model)

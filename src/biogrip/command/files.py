@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from biogrip import __version__
+from biogrip.command.hold import load_in_words
 from biogrip.command.options import Setting
 from biogrip.command.outputs import (
     WRITTEN_BY,
@@ -27,14 +28,8 @@ from biogrip.command.outputs import (
     table_of,
     write_result,
 )
-from biogrip.command.settings import (
-    Asked,
-    check_settings,
-    is_table,
-    load_in_words,
-    read_table,
-    read_trace,
-)
+from biogrip.command.settings import Asked, check_settings, read_trace
+from biogrip.command.sheet import is_table, read_table
 from biogrip.command.words import in_columns, in_words
 from biogrip.config.case import SampleCase
 from biogrip.config.loading import trace_defaults
