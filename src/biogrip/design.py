@@ -22,7 +22,7 @@ from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.command.outputs import WRITTEN_BY, check_outputs
 from biogrip.config.case import SampleCase
 from biogrip.config.design_blocks import SHARED, DesignBlock, DesignConfig
-from biogrip.config.loading import load, read_config_of, trace_defaults
+from biogrip.config.loading import load, read_config_of, read_configs, trace_defaults
 from biogrip.config.source import overlaid, read_config, read_source
 from biogrip.config.trace_blocks import SampleBlocks
 from biogrip.digits import significant, with_unit
@@ -179,7 +179,8 @@ def read_samples(config: Path) -> tuple[list[SampleCase], DesignBlock]:
     """Read the samples of a config, and the limits of the design; see `design` for errors."""
     # Studies that are installed offer their samples, by the files of their configs.
     files = [offer.load()() for offer in entry_points(group="biogrip.samples")]
-    merged, _ = read_config_of(DesignConfig, [trace_defaults(), *files])
+    cases = {"cases": read_configs(files).get("cases", {})}
+    merged = overlaid(read_configs([trace_defaults()]), cases)
     given, notes = read_config_of(DesignConfig, [config])
     for note in notes:
         print(visible_lines(note), file=sys.stderr)

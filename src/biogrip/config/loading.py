@@ -6,13 +6,15 @@ each before it is checked.
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import fields
+from difflib import get_close_matches
 from functools import reduce
 from pathlib import Path
 from typing import Any, TypeVar
 
 from biogrip.config.messages import checked, with_numbers
 from biogrip.config.source import KeyPath, Source, dotted, overlaid, place, read_config, read_source
-from biogrip.errors import BiogripError, nearest
+from biogrip.config.trace_blocks import IntervalBlock
+from biogrip.errors import BiogripError
 from biogrip.fit.search_range import GeneRange, SearchRange
 from biogrip.keys import Complaint, built
 
@@ -20,6 +22,8 @@ T = TypeVar("T")
 
 # Most complaints in a message.
 _SHOWN = 6
+# Likeness from which a name is a key with a mistake, and not another key.
+_MISSPELT = 0.8
 
 
 def trace_defaults() -> Path:
@@ -75,14 +79,22 @@ def read_config_of(kind: Any, files: Sequence[Path]) -> tuple[dict[str, Any], li
     These may be of a study; one that is nearly a key of the block is a `BiogripError`.
     """
     config, sources = read_configs(files), [*map(read_source, files)]
-    known = [field.name for field in fields(kind)]
-    others = [name for name in config if name not in known]
-    near = {name: nearest(name, known) for name in others}
-    allowed = f" Allowed here: {', '.join(known)}."
-    complaints = [((name,), f"unknown key.{near[name]}{allowed}") for name in others if near[name]]
+    kinds: dict[KeyPath, Any] = {(): kind, ("identifiability",): IntervalBlock}
+    complaints, notes = list[Complaint](), list[str]()
+    for above, block_kind in kinds.items():
+        block = config.get(above[0]) if above else config
+        known = [field.name for field in fields(block_kind)]
+        for name in [*block] if isinstance(block, dict) else ():
+            path = (*above, name)
+            near = get_close_matches(name, known, n=1, cutoff=_MISSPELT)
+            if name not in known and near:
+                text = f"unknown key. Did you mean '{near[0]}'? Allowed here: {', '.join(known)}."
+                complaints.append((path, text))
+            elif name not in known:
+                notes.append(f"{place(path, sources)}: {dotted(path)}: is not used here.")
+                del block[name]
     refuse(complaints, sources)
-    notes = [f"{place((name,), sources)}: {name}: is not used here." for name in others]
-    return {name: config[name] for name in config if name in known}, notes
+    return config, notes
 
 
 def _origin(path: KeyPath, sources: Sequence[Source], shared: Collection[str]) -> KeyPath:
