@@ -72,7 +72,7 @@ else:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Shared(ExperimentBlocks, _MethodBlocks):
+class Shared(_MethodBlocks, ExperimentBlocks):
     """Blocks that a study sets for all cases, and that a case may change for itself."""
 
     models: Equations
