@@ -323,29 +323,22 @@ class _Excess:
     def _crossing(
         self, lags: Lags, side: int, value: float, root: float, accuracy: float
     ) -> tuple[float | None, BoolArray]:
-        """Return the limit with certain lags, and which it needs, beginning with a value."""
-        from scipy.optimize import nnls
+        """Return the limit with certain lags, and which it needs, beginning with a value.
 
-        above, below = self._quantity.added(lags)
-        seen: BoolArray = np.any(lags.rows, axis=1)
-        ratio = self._quantity.below is not None
-        rows = np.column_stack((lags.rows, above))
-        measured = np.append(self._fit.measured, 0.0)
+        Each value is held; Newton's step from there leads to the next, or, where that is not
+        between the values known to be inside and outside, half of the way.
+        """
+        held_fit = _HeldFits(self._fit, self._quantity, lags)
         inner, outer = self.best, math.inf
         for _ in range(_MOST_TRIALS):
             value = value if side > 0 else max(value, 0.0)
             # Rounding of a row that is far heavier than its value takes would outweigh the trace.
-            held = min(self._deviation, _SHARE_HELD * max(value, self.best) * self._divisor)
-            weight = _WEIGHT_HELD / held
-            rows[:, -1] = np.where(seen, weight * (above - value * below), 0.0)
-            measured[-1] = 0.0 if ratio else weight * value
-            amplitudes, norm = nnls(rows.T, measured, maxiter=100 * len(rows))
+            share = _SHARE_HELD * max(value, self.best) * self._divisor
+            amplitudes, norm, slope = held_fit.at(value, _WEIGHT_HELD / min(self._deviation, share))
             reached = math.sqrt(max(norm**2 - self._least, 0.0))
             over = reached - root
             if over < 0 and value <= 0:
                 break
-            force = weight * float(measured[-1] - amplitudes @ rows[:, -1])
-            slope = force * (float(below @ amplitudes) if ratio else 1.0)
             # Where the excess is flat, its slope says nothing.
             steep = side * slope > 0 and reached > _FLAT_SHARE * root
             step = -over * reached / slope if steep else side * math.inf
@@ -357,11 +350,42 @@ class _Excess:
             far = outer if math.isfinite(outer) else self.best + _TRIAL_GROWTH * (value - self.best)
             if far == inner:
                 break
-            share = (value + step - inner) / (far - inner)
-            if far == outer and not _JUMP_WIDTH < share < 1 - _JUMP_WIDTH:
-                share = 0.5
-            value = inner + min(share, 1.0) * (far - inner)
-        return None, seen
+            value = _next_trial(value + step, inner, far, halve=far == outer)
+        return None, held_fit.seen
+
+
+def _next_trial(aim: float, inner: float, far: float, *, halve: bool) -> float:
+    """Return the value aimed at if it is between an inner and a far one, or one between."""
+    share = (aim - inner) / (far - inner)
+    if halve and not _JUMP_WIDTH < share < 1 - _JUMP_WIDTH:
+        share = 0.5
+    return inner + min(share, 1.0) * (far - inner)
+
+
+class _HeldFits:
+    """Fits of non-negative amplitudes of lags with one more row, which holds a quantity."""
+
+    def __init__(self, fit: AnySampleFit, quantity: _Functional, lags: Lags) -> None:
+        self._above, self._below = quantity.added(lags)
+        self._is_ratio = quantity.below is not None
+        self.seen: BoolArray = np.any(lags.rows, axis=1)
+        self._rows = np.column_stack((lags.rows, self._above))
+        self._measured = np.append(fit.measured, 0.0)
+
+    def at(self, value: float, weight: float) -> tuple[Array, float, float]:
+        """Hold a value; return amplitudes, the norm left, and half the slope of its square."""
+        from scipy.optimize import nnls
+
+        row = weight * (self._above - value * self._below)
+        self._rows[:, -1] = np.where(self.seen, row, 0.0)
+        self._measured[-1] = 0.0 if self._is_ratio else weight * value
+        amplitudes, norm = nnls(self._rows.T, self._measured, maxiter=100 * len(self._rows))
+        force = weight * float(self._measured[-1] - amplitudes @ self._rows[:, -1])
+        return (
+            amplitudes,
+            norm,
+            force * (float(self._below @ amplitudes) if self._is_ratio else 1.0),
+        )
 
 
 def _quantities(residuals: Residuals, lags: Lags, times: Sequence[float]) -> Iterator[_Functional]:
