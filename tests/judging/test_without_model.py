@@ -19,6 +19,7 @@ from biogrip.judging.without_model import (
     WithoutModel,
     _Excess,
     _Functional,
+    _next_trial,
     tell_without_model,
     times_told,
 )
@@ -292,3 +293,21 @@ def test_words_are_those_of_a_verdict() -> None:
     assert [each.verdict for each in told] == verdicts
     words = ["15.0 Pa (14.0 to 16.0)", "at least 14 Pa", "at most 16 Pa", "not determined"]
     assert [each.words() for each in told] == words
+
+
+@pytest.mark.parametrize(
+    ("aim", "far", "halve", "tried"),
+    [
+        (3.0, 10.0, True, 3.0),
+        # Beyond the far end, or at an end: halfway between 2 and 10, where the excess is known.
+        (12.0, 10.0, True, 6.0),
+        (2.0, 10.0, True, 6.0),
+        # Where nothing is known beyond, no further than that.
+        (12.0, 10.0, False, 10.0),
+        (3.0, 10.0, False, 3.0),
+    ],
+)
+def test_the_next_value_is_between_those_known(
+    aim: float, far: float, halve: bool, tried: float
+) -> None:
+    assert _next_trial(aim, 2.0, far, halve=halve) == tried
