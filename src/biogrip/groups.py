@@ -304,13 +304,6 @@ def _left_out(grouped: _Grouped, cells: Sequence[Cell]) -> Iterator[str]:
     if several := [cell for cell in cells if len(cell.traces) > 1]:
         names = [f"{cell.name} ({len(cell.traces)})" for cell in several]
         yield f"Averages of several traces: {_few(names)}."
-        for column, nests in shared_columns(grouped.told, grouped.by):
-            words = ({told.words[column] for told in cell.traces} for cell in several)
-            if column not in made_by and not nests and max(map(len, words)) > 1:
-                yield (
-                    f"These differ in {column}: if cells are numbered anew in each, "
-                    f"--unit {column} takes them for different ones."
-                )
 
 
 def _not_determined(cells: Sequence[Cell], compared: Compared) -> Iterator[str]:
@@ -342,7 +335,8 @@ def _pairs(cells: Sequence[Cell], compared: Compared, grouped: _Grouped) -> Iter
         paired = any(row.get("pairs") for (_, name), row in compared.items() if name == group)
         if both := sorted(of[first] & of[group]):
             left = sorted(of[first] ^ of[group]) if paired else both
-            follows = "are pairs, of which ratio and p are (paired t test)" if paired else "are few"
+            follows = "are pairs, of which ratio and p are (paired t test)"
+            follows = follows if paired else "are fewer than those of one group alone"
             yield (
                 f"{grouped.unit} in {first} and {group}: {_few(both)}. These {follows}"
                 + f"; left out of ratio and p: {_few(left)}" * bool(left)
@@ -385,7 +379,7 @@ def _for_a_paper(grouped: _Grouped, cells: Sequence[Cell], compared: Compared) -
     )
     version = max(trace.get(WRITTEN_BY, "") for trace in grouped.used) or __version__
     tests = _tests(grouped, cells, [*compared.values()])
-    return paragraph([*together(made), *outcome_in_words(outcome), *tests], version)[0]
+    return paragraph([*together(made), *outcome_in_words(outcome), *tests], version)
 
 
 def _tests(

@@ -24,7 +24,7 @@ class Design:
     scatter: tuple[float, float] = (0.2, 0.2)
     """Of dishes, as standard deviations of logarithms; of days, beyond what both groups share."""
     days: float | None = None
-    """Scatter of days that both groups share, or None if dishes of the groups are different ones."""
+    """Scatter of days that both groups share, or None if each group has dishes of its own."""
     cells: int = 8
     cell_scatter: float = 0.25
     ratio: float = 1.0
@@ -50,9 +50,7 @@ class Design:
             )
         ]
 
-    def _unit(
-        self, rng: np.random.Generator, group: int, name: str, mean: float
-    ) -> Sequence[Cell]:
+    def _unit(self, rng: np.random.Generator, group: int, name: str, mean: float) -> Sequence[Cell]:
         truth = mean + self.cell_scatter * rng.standard_normal(self.cells)
         truth += group * np.log(self.ratio)
         noise = rng.standard_normal(self.cells)
@@ -87,5 +85,42 @@ class Design:
         p = np.array([row["k", "b"].get("p", np.nan) for row in rows])
         told = p[np.isfinite(p)]
         with np.errstate(invalid="ignore"):
-            below = [100 * float(np.mean(told < level)) if len(told) else np.nan for level in (0.05, 0.01)]
+            below = [
+                100 * float(np.mean(told < level)) if len(told) else np.nan
+                for level in (0.05, 0.01)
+            ]
         return below[0], below[1], 100 * len(told) / tables
+
+
+def in_words(design: Design) -> str:
+    """Return shares of tables as docs/groups.md has them."""
+    small, tiny, told = design.shares()
+    return f"{small:.1f} %, {tiny:.1f} %" + f", of {told:.0f} % of tables" * (told < 100)
+
+
+_DISHES = {
+    f"{a} and {b} dishes of {100 * x:.0f} and {100 * y:.0f} %": Design(units=(a, b), scatter=(x, y))
+    for a, b in ((3, 3), (3, 6), (3, 10), (5, 5), (5, 10), (10, 10))
+    for x, y in ((0.1, 0.1), (0.2, 0.2), (0.4, 0.1), (0.1, 0.4))
+}
+_DAYS = {
+    f"{a} and {b} days, {min(a, b)} the same": Design(units=(a, b), scatter=(0.1, 0.1), days=0.35)
+    for a, b in ((2, 2), (3, 3), (5, 5), (10, 10), (4, 3))
+}
+_SHARES = ((0.0, 0.1), (0.0, 0.28), (0.0, 0.46), (0.28, 0.28), (0.5, 0.5))
+_BOUNDED = {
+    f"4 and 4 dishes, bounded {100 * a:.0f} and {100 * b:.0f} %, {words}": Design(
+        units=(4, 4), scatter=(0.1, 0.1), cell_scatter=0.5, bounded=(a, b), bound=bound
+    )
+    for a, b in _SHARES
+    for bound, words in (("own", "by the cell"), ("noise", "by noise"))
+}
+_POWER = {
+    f"{n} and {n} {what}, ratio {ratio}": Design(
+        units=(n, n), scatter=(scatter, scatter), days=days, ratio=ratio
+    )
+    for n in (3, 5, 10)
+    for what, ratio, scatter, days in (("dishes", 1.5, 0.2, None), ("days", 1.4, 0.1, 0.35))
+}
+DOCUMENTED = _DISHES | _DAYS | _BOUNDED | _POWER
+"""Designs by what docs/groups.md calls them."""

@@ -5,7 +5,7 @@ of a group side by side.
 """
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -26,7 +26,12 @@ ONE_COLUMN_IN = 85 / 25.4
 _COLOURS, _SHAPES = (BLUE, ORANGE, GREEN, PURPLE, SKY, "#E69F00"), "osDPX*p"
 _MARKS = {ABOVE: "^", KNOWN: "o", BELOW: "v"}
 _PANEL_IN, _KEY_IN, _LONGEST = 2.3, 0.4, 14
-_KEY: dict[str, Any] = {"color": GREY, "linestyle": "", "mew": 0.5}
+_KEY = {
+    "cell with limits, hollow if doubtful": "o",
+    "cell, at most this": _MARKS[BELOW],
+    "cell, at least this": _MARKS[ABOVE],
+    "geometric mean with limits": "+",
+}
 # Most groups for which half a column has room, and most whose ratios have room for intervals.
 _FEW_GROUPS, _MOST_GROUPS = 2, 4
 # Most letters of groups' names that have room in half a column, and in a whole one.
@@ -52,7 +57,7 @@ def draw_cells(
     Units are those of the numbers, by quantity; the comparison has groups and their means. The last
     is the name of what was repeated, if anything was.
     """
-    drawn_of = [name for name in units if any(_mark(it, name) for it in cells)]
+    drawn_of = [name for name in units if any(cell.place(name) for cell in cells)]
     groups = list(dict.fromkeys(group for _, group in compared))
     narrow = ONE_COLUMN_IN / (1 if len(groups) > _FEW_GROUPS else 2)
     across = max(min(int(width_in / narrow + 1e-9), len(drawn_of)), 1)
@@ -64,31 +69,11 @@ def draw_cells(
     for name, axes in zip(drawn_of, places, strict=False):
         _draw_quantity(axes, name, cells, compared, groups)
         axes.set_ylabel(literal(with_unit(name, units[name])))
-    handles = [Line2D([], [], **_KEY | look, label=said) for said, look in _key(cells, unit)]
+    marks = _KEY | ({f"{literal(_short(unit))}, joined if the same": "s"} if unit else {})
+    look: dict[str, Any] = {"color": GREY, "linestyle": "", "ms": 4}
+    handles = [Line2D([], [], marker=mark, label=said, **look) for said, mark in marks.items()]
     drawn.legend(handles=handles, loc="outside lower center", ncols=2, fontsize=6)
     return drawn
-
-
-def _mark(cell: Cell, name: str) -> str:
-    """Return the mark of a cell, nothing if it tells nothing of a quantity."""
-    place = cell.place(name)
-    return _MARKS[place[-1]] if place else ""
-
-
-def _key(cells: Sequence[Cell], unit: str | None) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield what marks mean, with how they look."""
-    yield "cell and its limits", {"marker": "o", "ms": 3}
-    if any(cell.doubtful for cell in cells):
-        yield "cell with a doubtful fit", {"marker": "o", "ms": 3, "mfc": "white"}
-    marks = {_mark(cell, name) for cell in cells for name in cell.others}
-    for side, said in ((BELOW, "at most"), (ABOVE, "at least")):
-        if _MARKS[side] in marks:
-            yield f"cell, {said} this", {"marker": _MARKS[side], "ms": 3}
-    if unit:
-        joined = len({(it.unit, it.group) for it in cells}) > len({it.unit for it in cells})
-        text = f"mean of a {literal(_short(unit))}" + ", joined if the same" * joined
-        yield text, {"marker": "s", "ms": 6, "mec": BLACK, "mew": 0.8}
-    yield "geometric mean and its limits", {"marker": "+", "ms": 7, "color": BLACK}
 
 
 def _draw_quantity(
@@ -154,30 +139,23 @@ def _draw_unit(
     """Draw cells side by side around a place; doubtful ones hollow. Return their levels."""
     shown = [(cell, place) for cell in cells if (place := cell.place(name))]
     shifts = _FILLED * slot * (np.arange(len(shown)) * _GOLDEN % 1 - 0.5)
-    for (cell, (value, _, side)), x in zip(shown, (middle + shifts).tolist(), strict=True):
-        look = {"color": color, "mfc": "white" if cell.doubtful else color, "mew": 0.5}
-        axes.plot(x, no_longer_log(value), _MARKS[side], ms=3, alpha=0.7, zorder=3, **look)
-    if bars := [
-        (x, *(no_longer_log(value + sign * _NORMAL * error) for sign in (-1, 1)))
-        for (_, (value, error, side)), x in zip(shown, (middle + shifts).tolist(), strict=True)
-        if side == KNOWN
-    ]:
-        axes.vlines(*np.transpose(bars), color=GREY, linewidth=0.4, zorder=1)
-    return [no_longer_log(value) for _, (value, _, _) in shown]
+    for (cell, (value, error, side)), x in zip(shown, (middle + shifts).tolist(), strict=True):
+        face = "white" if cell.doubtful else color
+        look = {"ms": 3, "color": color, "mfc": face, "mew": 0.5, "alpha": 0.7, "zorder": 3}
+        axes.plot(x, no_longer_log(value), _MARKS[side], **look)
+        ends = (no_longer_log(value + sign * _NORMAL * error) for sign in (-1, 1))
+        axes.vlines(x, *ends, color=GREY, linewidth=0.4, zorder=1)
+    return [no_longer_log(value) for _, (value, *_) in shown]
 
 
 def _scale(axes: Axes, low: float, high: float) -> None:
-    """Set the axis of levels, logarithmic where they span a decade, with ticks as numbers."""
-    if high > _DECADE * low:
-        axes.set_yscale("log")
-        subs = (1.0, 2.0, 3.0, 6.0) if high < _DECADE**2 * low else (1.0,)
-        axes.yaxis.set_major_locator(LogLocator(subs=subs, numticks=_MOST_TICKS))
-        axes.yaxis.set_minor_locator(NullLocator())
-        axes.set_ylim(low / _MARGIN, high * _MARGIN)
-    else:
-        axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
-        margin = 0.08 * (high - low) or 0.1 * high
-        axes.set_ylim(low - margin, high + margin)
+    """Set the axis of levels, logarithmic as ratios are, with ticks as numbers."""
+    axes.set_yscale("log")
+    subs = (1.0, 2.0, 3.0, 6.0) if high < _DECADE**2 * low else (1.0,)
+    decades, few = LogLocator(subs=subs, numticks=_MOST_TICKS), MaxNLocator(5, steps=[1, 2, 5, 10])
+    axes.yaxis.set_major_locator(decades if high > _DECADE * low else few)
+    axes.yaxis.set_minor_locator(NullLocator())
+    axes.set_ylim(low / _MARGIN, high * _MARGIN)
     axes.yaxis.set_major_formatter(FuncFormatter(lambda level, _: plain(level, 4)))
 
 

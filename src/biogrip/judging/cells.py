@@ -21,7 +21,6 @@ How a cell came to be only bounded is not known, and the mean depends on it. A b
 as it is, and as the end of what is determined in the group. The larger p is given, with its ratio.
 """
 
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import hypot, inf, sqrt
@@ -56,7 +55,7 @@ SIDES = {BOUNDED_ABOVE: BELOW, BOUNDED_BELOW: ABOVE}
 # Five digits know a logarithm no better; limits of traces without noise may be equal.
 _LEAST_WIDTH = 1e-4
 _LARGEST_LOG = 700.0
-# Fewest of a group's cells that tell anything, and fewest of these that are determined.
+# Least share of a group's cells that tell anything, and of these that determine the quantity.
 _LEAST_TOLD, _LEAST_KNOWN = 1 / 2, 1 / 3
 
 
@@ -185,9 +184,9 @@ def compare(
 ) -> Compared:
     """Return `COLUMNS` by quantity and group; ratio and p value are against the first group.
 
-    Of cells whose fit is rejected it takes what is told without a model. A mean takes half of the
-    cells that tell anything, a third of these determined; of units, half of them, and without
-    units `FEWEST_CELLS`. ``of_units`` has the logarithms of units.
+    Of cells whose fit is rejected it takes what is told without a model. A mean takes that half of
+    the cells tell anything, and a third of these determine it; without units, `FEWEST_CELLS`.
+    ``of_units`` has the logarithms of units.
     """
     compared: Compared = {}
     for quantity in dict.fromkeys(name for cell in cells for name in cell.known | cell.others):
@@ -200,6 +199,8 @@ def compare(
             }
             _add_ratios([*rows.values()], confidence)
             readings.append(rows)
+            if not any(row["bounded"] for row in rows.values()):
+                break
         compared |= max(readings, key=_least_p)
     return compared
 
@@ -214,13 +215,9 @@ def _row(cells: Sequence[Cell], quantity: str, units: bool, at_end: bool) -> dic
     determined = sum(side == KNOWN for *_, side in told)
     row: dict[str, Any] = {"cells": len(cells), "determined": determined}
     row |= {"bounded": len(told) - determined, "of_units": {}}
-    counts, counts_told = Counter(cell.unit for cell in cells), Counter(unit for unit, *_ in told)
-    usable = [it for it in counts if counts_told[it] >= _LEAST_TOLD * counts[it]]
-    row |= {"units": len(usable)} if units else {}
-    told = [it for it in told if it[0] in usable]
-    known = sum(side == KNOWN for *_, side in told)
+    row |= {"units": len({unit for unit, *_ in told})} if units else {}
     fewest = max(1 if units else FEWEST_CELLS, _LEAST_KNOWN * len(told))
-    if known < fewest or len(usable) < _LEAST_TOLD * len(counts):
+    if determined < fewest or len(told) < _LEAST_TOLD * len(cells):
         return row
     names = np.array([unit for unit, *_ in told])
     values, errors, sides = np.array([place for _, *place in told]).T
