@@ -41,7 +41,7 @@ _WIDE, _FILLED = 0.8, 0.7
 # Steps of this share fill a unit evenly, however many its cells are.
 _GOLDEN = 0.618034
 _NORMAL, _BEYOND = 1.96, 1.5
-_DECADE, _MARGIN, _MOST_TICKS = 10.0, 1.15, 9
+_FAR, _MARGIN, _MOST_TICKS = 3.0, 1.15, 9
 _SAID: dict[str, Any] = {"ha": "center", "va": "bottom", "fontsize": 6.5, "linespacing": 1.1}
 
 
@@ -137,23 +137,24 @@ def _draw_unit(
     axes: Axes, name: str, cells: Sequence[Cell], middle: float, slot: float, color: str
 ) -> list[float]:
     """Draw cells side by side around a place; doubtful ones hollow. Return their levels."""
-    shown = [(cell, place) for cell in cells if (place := cell.place(name))]
+    shown = [(cell, *place) for cell in cells if (place := cell.place(name))]
     shifts = _FILLED * slot * (np.arange(len(shown)) * _GOLDEN % 1 - 0.5)
-    for (cell, (value, error, side)), x in zip(shown, (middle + shifts).tolist(), strict=True):
+    xs, levels = (middle + shifts).tolist(), [no_longer_log(value) for _, value, *_ in shown]
+    for (cell, *_, side), x, level in zip(shown, xs, levels, strict=True):
         face = "white" if cell.doubtful else color
         look = {"ms": 3, "color": color, "mfc": face, "mew": 0.5, "alpha": 0.7, "zorder": 3}
-        axes.plot(x, no_longer_log(value), _MARKS[side], **look)
-        ends = (no_longer_log(value + sign * _NORMAL * error) for sign in (-1, 1))
-        axes.vlines(x, *ends, color=GREY, linewidth=0.4, zorder=1)
-    return [no_longer_log(value) for _, (value, *_) in shown]
+        axes.plot(x, level, _MARKS[side], **look)
+    reaches = [[no_longer_log(v + sign * _NORMAL * e) for _, v, e, _ in shown] for sign in (-1, 1)]
+    axes.vlines(xs, *reaches, color=GREY, linewidth=0.4, zorder=1)
+    return levels
 
 
 def _scale(axes: Axes, low: float, high: float) -> None:
     """Set the axis of levels, logarithmic as ratios are, with ticks as numbers."""
     axes.set_yscale("log")
-    subs = (1.0, 2.0, 3.0, 6.0) if high < _DECADE**2 * low else (1.0,)
+    subs = (1.0, 2.0, 3.0, 6.0) if high < 100 * low else (1.0,)
     decades, few = LogLocator(subs=subs, numticks=_MOST_TICKS), MaxNLocator(5, steps=[1, 2, 5, 10])
-    axes.yaxis.set_major_locator(decades if high > _DECADE * low else few)
+    axes.yaxis.set_major_locator(decades if high > _FAR * low else few)
     axes.yaxis.set_minor_locator(NullLocator())
     axes.set_ylim(low / _MARGIN, high * _MARGIN)
     axes.yaxis.set_major_formatter(FuncFormatter(lambda level, _: plain(level, 4)))
