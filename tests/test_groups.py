@@ -75,7 +75,7 @@ def test_the_censored_mean_is_that_of_the_greatest_likelihood(seed: int) -> None
     def loss(parameters: Array) -> float:
         of = norm(parameters[0], np.exp(parameters[1]))
         logs = [of.logpdf(values), of.logcdf(values), of.logsf(values)]
-        return -float(weights @ np.choose(sides % 3, [logs[0], logs[2], logs[1]]))
+        return -float(weights @ np.choose(sides.astype(int) % 3, [logs[0], logs[2], logs[1]]))
 
     fit = minimize(loss, (1.0, -1.0), method="Nelder-Mead", options={"xatol": 1e-9, "fatol": 1e-12})
     assert censored_mean(values, sides, weights) == pytest.approx(fit.x[0], abs=1e-6)

@@ -107,13 +107,13 @@ _DAYS = {
     f"{a} and {b} days, {min(a, b)} the same": Design(units=(a, b), scatter=(0.1, 0.1), days=0.35)
     for a, b in ((2, 2), (3, 3), (5, 5), (10, 10), (4, 3))
 }
-_SHARES = ((0.0, 0.1), (0.0, 0.28), (0.0, 0.46), (0.28, 0.28), (0.5, 0.5))
 _BOUNDED = {
-    f"4 and 4 dishes, bounded {100 * a:.0f} and {100 * b:.0f} %, {words}": Design(
+    f"4 and 4 dishes, {100 * a:.0f} and {100 * b:.0f} % bounded {words}": Design(
         units=(4, 4), scatter=(0.1, 0.1), cell_scatter=0.5, bounded=(a, b), bound=bound
     )
-    for a, b in _SHARES
-    for bound, words in (("own", "by the cell"), ("noise", "by noise"))
+    for a, b in ((0.0, 0.1), (0.0, 0.28), (0.0, 0.46), (0.28, 0.28))
+    for bound, words in (("own", "by their value"), ("noise", "by noise"))
+    if (a, bound) != (0.28, "noise")
 }
 _POWER = {
     f"{n} and {n} {what}, ratio {ratio}": Design(

@@ -111,7 +111,7 @@ def _draw_quantity(
             axes.text(place, 1.0, text, transform=axes.get_xaxis_transform(), **_SAID)
     for unit, points in means.items():
         color, shape = (looks[numbers[unit] % len(looks)] for looks in (_COLOURS, _SHAPES))
-        line = {"color": color, "linewidth": 0.8, "zorder": 4}
+        line: dict[str, Any] = {"color": color, "linewidth": 0.8, "zorder": 4}
         axes.plot(*np.transpose(points), marker=shape, mec=BLACK, mew=0.8, ms=6, **line)
     if said:
         text = f"ratio to\n{_short(groups[0])}" + (", p" if len(groups) > _MOST_GROUPS else "")
@@ -141,11 +141,10 @@ def _draw_unit(
     shifts = _FILLED * slot * (np.arange(len(shown)) * _GOLDEN % 1 - 0.5)
     xs, levels = (middle + shifts).tolist(), [no_longer_log(value) for _, value, *_ in shown]
     for (cell, *_, side), x, level in zip(shown, xs, levels, strict=True):
-        face = "white" if cell.doubtful else color
-        look = {"ms": 3, "color": color, "mfc": face, "mew": 0.5, "alpha": 0.7, "zorder": 3}
-        axes.plot(x, level, _MARKS[side], **look)
-    reaches = [[no_longer_log(v + sign * _NORMAL * e) for _, v, e, _ in shown] for sign in (-1, 1)]
-    axes.vlines(xs, *reaches, color=GREY, linewidth=0.4, zorder=1)
+        look: dict[str, Any] = {"ms": 3, "mew": 0.5, "alpha": 0.7, "zorder": 3, "color": color}
+        axes.plot(x, level, _MARKS[side], mfc="white" if cell.doubtful else color, **look)
+    low, high = ([no_longer_log(v + s * _NORMAL * e) for _, v, e, _ in shown] for s in (-1, 1))
+    axes.vlines(xs, low, high, color=GREY, linewidth=0.4, zorder=1)
     return levels
 
 

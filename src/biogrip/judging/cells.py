@@ -201,7 +201,7 @@ def compare(
             readings.append(rows)
             if not any(row["bounded"] for row in rows.values()):
                 break
-        compared |= max(readings, key=_least_p)
+        compared.update(max(readings, key=_least_p))
     return compared
 
 

@@ -53,7 +53,7 @@ def censored_mean(values: Array, sides: Array, weights: Array) -> float:
     return nan
 
 
-def pseudo_values(values: Array, sides: Array, weights: Array, units: Array) -> dict[Any, float]:
+def pseudo_values(values: Array, sides: Array, weights: Array, units: Any) -> dict[Any, float]:
     """Return the pseudo-value of every unit (n,); their mean is the cells' mean.
 
     Nothing is returned where a mean is missing, as if without a unit no two cells were known.
