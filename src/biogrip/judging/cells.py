@@ -201,7 +201,8 @@ def compare(
             readings.append(rows)
             if not any(row["bounded"] for row in rows.values()):
                 break
-        compared.update(max(readings, key=_least_p))
+        chosen = max(readings, key=_least_p)
+        compared |= chosen
     return compared
 
 
