@@ -102,7 +102,7 @@ def test_pseudo_values_are_means_of_units_where_no_cell_is_bounded() -> None:
 
 @pytest.mark.parametrize(("cells", "error"), [(5, 0.03), (6, 0.1), (12, 0.1), (12, 0.3)])
 def test_limits_hold_the_truth_and_equal_dishes_seldom_differ(cells: int, error: float) -> None:
-    """In 500 pairs 95 % are known to within 2 %, in their 1000 dishes to within 1.4 %."""
+    """In 500 pairs 95 % are known to within 3 % (three errors), in 1000 groups to within 2 %."""
     rng = np.random.default_rng(7)
     medians, ratios, false = [], [], 0
     for _ in range(500):
@@ -122,7 +122,7 @@ def test_limits_hold_the_truth_and_equal_dishes_seldom_differ(cells: int, error:
             for group, median in (("a", 1.0), ("b", ratio)):
                 own = found["k", group]
                 medians.append(own["low"] <= median <= own["high"])
-    assert 0.93 <= np.mean(ratios) <= 0.97
+    assert 0.92 <= np.mean(ratios) <= 0.98
     assert 0.93 <= np.mean(medians) <= 0.97
     assert false <= 0.06 * 500
 
@@ -309,7 +309,7 @@ def test_levels_and_powers_are_as_documented(name: str) -> None:
         (Design(units=(3, 3), days=0.35, scatter=(0.1, 0.1)), 2, 8),
         (Design(units=(4, 4), bounded=(0, 0.28), bound="own"), 0, 7),
         (Design(units=(4, 4), bounded=(0, 0.28), bound="noise"), 0, 8),
-        (Design(units=(3, 3), days=0.35, scatter=(0.05, 0.05), ratio=1.4), 60, 100),
+        (Design(units=(3, 3), days=0.35, scatter=(0.05, 0.05), ratio=1.4), 40, 100),
     ],
     ids=str,
 )

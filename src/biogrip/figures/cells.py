@@ -30,7 +30,7 @@ _KEY = {
     "cell with limits, hollow if doubtful": "o",
     "cell, at most this": _MARKS[BELOW],
     "cell, at least this": _MARKS[ABOVE],
-    "geometric mean with limits": "+",
+    "geometric mean with limits": "_",
 }
 # Most groups for which half a column has room, and most whose ratios have room for intervals.
 _FEW_GROUPS, _MOST_GROUPS = 2, 4
