@@ -155,14 +155,14 @@ def one_sided_in_words(
     return [f"One-sided limits hold with {50 * (1 + found[0]['confidence']):g} % confidence."]
 
 
-def for_a_paper(found: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Return sentences for a paper, as text and as LaTeX: one per quantity with a limit.
+def for_a_paper(found: Mapping[str, Any]) -> list[str]:
+    """Return sentences for a paper: one per quantity with a limit.
 
     Each has its condition, if any. Nothing if the fit is doubtful or rejected.
     """
     if found["fit"] != OK:
         return []
-    pairs = []
+    sentences = []
     for each in found["quantities"]:
         low, high, confidence = each["low"], each["high"], 100 * found["confidence"]
         if low is None and high is None:
@@ -175,16 +175,9 @@ def for_a_paper(found: Mapping[str, Any]) -> list[tuple[str, str]]:
             numbers = within_limits(each["value"], low, high)
         provided = f", provided {each['provided']}" if each["provided"] else ""
         value, reach = f"{numbers[0]} {each['unit']}".rstrip(), " to ".join(numbers[1:])
-        told = f" {sign} {value} ({confidence:g} % {f'{kind} {reach}'.rstrip()}, n = 1 trace"
-        told += f"{provided})"
-        pairs.append((f"{each['quantity']}{told}", f"{each['symbol']}{_in_latex(told)}"))
-    return pairs
-
-
-def _in_latex(text: str) -> str:
-    """Return text as LaTeX, with powers of ten as mathematics."""
-    latex = text.translate(_LATEX_OF)
-    return _POWER.sub(lambda it: rf"${it[1]} \times 10^{{{int(it[2])}}}$", latex)
+        within = f"{confidence:g} % {f'{kind} {reach}'.rstrip()}, n = 1 trace{provided}"
+        sentences.append(f"{each['quantity']} {sign} {value} ({within})")
+    return sentences
 
 
 def further_notes(found: Mapping[str, Any]) -> list[str]:
@@ -307,14 +300,6 @@ _INSTRUMENTS = {
     "oscillation": "In oscillation storage and loss moduli were recorded over frequency",
 }
 _MOST_PHASES, _MOST_REFUSED = 4, 3
-_LATEX_OF = str.maketrans(
-    {
-        **{sign: rf"\{sign}" for sign in "%_&#${}"},
-        **{"\\": r"\textbackslash{}", "^": r"\^{}", "~": r"\~{}", "<": "$<$", ">": "$>$"},
-        **{"²": "$^2$", "χ": r"$\chi$", "τ": r"$\tau$", "Δ": r"$\Delta$", "→": r"$\to$"},
-    }
-)
-_POWER = re.compile(r"(\d[\d.]*)e([+-]\d+)\b")
 
 
 def set_up_in_words(found: Mapping[str, Any]) -> list[str]:
@@ -429,8 +414,8 @@ def in_sentences(text: str) -> list[str]:
     return re.split(r"(?<=\.) (?=[A-Z])", text)
 
 
-def paragraph(sentences: Iterable[str], version: str = __version__) -> tuple[str, str]:
-    """Return a paragraph as text and as LaTeX; at its end the software."""
+def paragraph(sentences: Iterable[str], version: str = __version__) -> str:
+    """Return a paragraph; at its end the software."""
     reference = REFERENCE.replace(__version__, version)
     text = " ".join([*sentences, f"Computed with biogrip {version} ({reference})."])
-    return legible(text), _in_latex(text)
+    return legible(text)
