@@ -125,7 +125,7 @@ EVIDENCE = ["evidence", "printed_values", "sampling_evidence"]
 OTHER_TABLES = [*INPUTS, *(["contact", "left_out"] if HAS_GRIPPER else [])]
 OTHER_TABLES += ["linearisation", "mechanics", "contact_loss"] if STUDY.gripped else []
 OTHER_TABLES += ["claims", "tables_5_to_7", *EVIDENCE] if STUDY.published else []
-OTHER_TABLES += ["readings", "readings_found"] * bool(STUDY.config.readings)
+OTHER_TABLES += ["readings", "readings_found"] * (len(STUDY.config.readings) > 1)
 # The paper's samples under other protocols, and these under its own.
 KNOWN = [STUDY.case(name).parameters for name in STUDY.published]
 OTHERS = [

@@ -62,6 +62,9 @@ class GeneticSettings(Block):
     """Most generations."""
     mutants: Literal["children", "all"] = "children"
     """Individuals that may mutate: `children`; or `all`, survivors except the best, too."""
+    cut: Literal["once", "between", "each"] = "once"
+    """`once`: one crossover cut, anywhere from first to last; `between`: one, between parameters;
+    `each`: one in every parameter."""
 
     def complaints(self) -> Iterator[Complaint]:
         """Find settings that leave no children, or whose limits of generations conflict."""
@@ -135,7 +138,7 @@ def evolve(
             if not len(running):
                 break
         own_rngs = [rngs[population] for population in running.tolist()]
-        children, before = cross(survivors, settings, own_rngs), ranking[:, 0]
+        children, before = cross(survivors, genome, settings, own_rngs), ranking[:, 0]
         if generation >= settings.mutation_start:
             mutate(children, genome, settings, own_rngs)
             if settings.mutants == "all":
@@ -182,23 +185,21 @@ def _taken(individuals: NDArray[Any], which: IntArray) -> NDArray[Any]:
 
 
 def cross(
-    parents: Chromosomes, settings: GeneticSettings, rngs: Sequence[np.random.Generator]
+    parents: Chromosomes,
+    genome: Genome,
+    settings: GeneticSettings,
+    rngs: Sequence[np.random.Generator],
 ) -> Chromosomes:
     """Produce both children of pairs of parents, (n_populations, n, n_genes), best first."""
     populations, count, genes = parents.shape
     n_children = settings.population - settings.survivors
     pairs = -(-n_children // 2)
-    first, last = (
-        min(cut if cut > 0 else genes + cut, genes - 1)
-        for cut in (settings.first_cut, settings.last_cut)
-    )
     mates = np.empty((populations, pairs, 2), dtype=np.int64)
-    cuts = np.empty((populations, pairs, 1), dtype=np.int64)
+    head = np.empty((populations, pairs, genes), dtype=bool)
     for row, rng in enumerate(rngs):
         mates[row] = _mates(count, pairs, settings, rng)
-        cuts[row, :, 0] = rng.integers(min(first, last), last, size=pairs, endpoint=True)
+        head[row] = np.arange(genes) < _cuts(pairs, genome, settings, rng)
     mothers, fathers = (_taken(parents, mates[:, :, parent]) for parent in (0, 1))
-    head = np.arange(genes) < cuts
     children = np.where(head, mothers, fathers), np.where(head, fathers, mothers)
     return np.concatenate(children, axis=1)[:, :n_children]
 
@@ -213,6 +214,23 @@ def _mates(
     even = parents // 2 * 2
     rounds = [rng.permutation(parents)[:even] for _ in range(-(-2 * pairs // even))]
     return np.concatenate(rounds)[: 2 * pairs].reshape(pairs, 2)
+
+
+def _cuts(
+    pairs: int, genome: Genome, settings: GeneticSettings, rng: np.random.Generator
+) -> IntArray:
+    """Draw where genes of the first parent end, (pairs, 1), or in each parameter, (pairs, n)."""
+    ends = np.cumsum(genome.sizes)
+    if settings.cut == "each":
+        within = rng.integers(0, genome.sizes, size=(pairs, len(ends)), endpoint=True)
+        return np.repeat(ends - genome.sizes + within, genome.sizes, axis=1)
+    if settings.cut == "between" and len(ends) > 1:
+        return rng.choice(ends[:-1], size=(pairs, 1))
+    first, last = (
+        min(cut if cut > 0 else genome.genes + cut, genome.genes - 1)
+        for cut in (settings.first_cut, settings.last_cut)
+    )
+    return rng.integers(min(first, last), last, size=(pairs, 1), endpoint=True)
 
 
 def mutate(

@@ -14,6 +14,9 @@ from biogrip.arrays import Array, IntArray
 from biogrip.keys import Block, Complaint
 from biogrip.physics.sample_model import SampleModel
 
+Chromosomes = NDArray[np.integer[Any]]
+"""Genes of individuals, (..., n_genes)."""
+
 
 @dataclass(frozen=True)
 class GeneRange(Block):
@@ -32,6 +35,11 @@ class GeneRange(Block):
     first_digit: Annotated[int, Field(ge=0, le=1)] = 1
     """Lowest value of the first digit g₂, if the others' is no higher. With 0 there are smaller
     numbers, and several ways to encode one."""
+    bits: Annotated[int, Field(ge=0, le=20)] = 0
+    """Number of genes that are bits of the logarithm between the ends of the range, in the place of
+    exponent and digits; with 0 there are none."""
+    gray: bool = False
+    """Neighbouring numbers differ by one bit (Gray's code)."""
 
     def complaints(self) -> Iterator[Complaint]:
         """Find bounds in the wrong order, and a range of a single value."""
@@ -46,14 +54,19 @@ class GeneRange(Block):
             yield (), f"{text} given under the case's key fixed."
 
     @property
+    def bounds(self) -> tuple[tuple[int, ...], tuple[int, ...]]:
+        """Smallest and largest value of each gene."""
+        return (self.bits * (0,), self.bits * (1,)) if self.bits else (self.least, self.most)
+
+    @property
     def least(self) -> tuple[int, ...]:
-        """Smallest value of each gene."""
+        """Smallest value of exponent and digits."""
         first = max(self.digit[0], self.first_digit)
         return self.exponent[0], first, *[self.digit[0]] * (self.digits - 1)
 
     @property
     def most(self) -> tuple[int, ...]:
-        """Largest value of each gene."""
+        """Largest value of exponent and digits."""
         return self.exponent[1], *[self.digit[1]] * self.digits
 
     @property
@@ -69,6 +82,8 @@ class GeneRange(Block):
     @property
     def values(self) -> Array:
         """All positive values that can be encoded, ascending, each the nearest double."""
+        if self.bits:
+            return self._between(np.arange(2**self.bits))
         mantissas = np.zeros(1)
         for least, most in zip(self.least[1:], self.most[1:], strict=True):
             mantissas = (10 * mantissas[:, None] + np.arange(least, most + 1)).ravel()
@@ -77,6 +92,16 @@ class GeneRange(Block):
         if self.least[1] == 0:
             return np.unique(values[values > 0])
         return values.ravel()
+
+    def of_bits(self, bits: Chromosomes) -> Array:
+        """Decode bits, (..., n_bits), the largest first, into a value each."""
+        plain = np.bitwise_xor.accumulate(bits, axis=-1) if self.gray else bits
+        return self._between(plain @ (1 << np.arange(self.bits)[::-1]))
+
+    def _between(self, numbers: IntArray) -> Array:
+        low, high = np.log([self.low, self.high])
+        values: Array = np.exp(low + (high - low) * numbers / (2**self.bits - 1))
+        return values
 
 
 @dataclass(frozen=True)
@@ -97,10 +122,6 @@ class SearchRange(Block):
             yield ("alpha", "exponent"), f"{text}most 0."
 
 
-Chromosomes = NDArray[np.integer[Any]]
-"""Genes of individuals, (..., n_genes)."""
-
-
 @dataclass(frozen=True)
 class Genome:
     """Encoding of a sample model's parameters as genes."""
@@ -110,8 +131,10 @@ class Genome:
     high: IntArray
     """Largest one, included, (n_genes,)."""
     sizes: tuple[int, ...]
-    """Number of genes of each parameter, (n_parameters,): its exponent and digits, in this
-    order."""
+    """Number of genes of each parameter, (n_parameters,): its exponent and digits, in this order,
+    or its bits."""
+    binary: tuple[tuple[int, GeneRange], ...] = ()
+    """Index and range of each parameter that has bits."""
 
     @property
     def genes(self) -> int:
@@ -134,6 +157,10 @@ class Genome:
         parameters: Array = chromosomes @ self._places
         parameters *= _TIMES.take(powers)
         parameters /= _OVER.take(powers)
+        for parameter, genes in self.binary:
+            first = self._exponents[parameter]
+            bits = chromosomes[..., first : first + genes.bits]
+            parameters[..., parameter] = genes.of_bits(bits)
         return parameters
 
     def keys(self, chromosomes: Chromosomes) -> list[Array]:
@@ -181,9 +208,9 @@ _OVER = np.array([10.0 ** max(-power, 0) for power in _POWERS])
 def make_genome(model: SampleModel, ranges: Mapping[str, GeneRange]) -> Genome:
     """Return the genome of a sample model, from gene ranges by `Parameter.range_name`."""
     chosen = [ranges[parameter.range_name] for parameter in model.parameters]
-    low = np.concatenate([genes.least for genes in chosen])
-    high = np.concatenate([genes.most for genes in chosen])
-    return Genome(low, high, tuple(genes.digits + 1 for genes in chosen))
+    low, high = (np.concatenate(ends) for ends in zip(*(g.bounds for g in chosen), strict=True))
+    sizes = tuple(len(genes.bounds[0]) for genes in chosen)
+    return Genome(low, high, sizes, tuple((i, g) for i, g in enumerate(chosen) if g.bits))
 
 
 def nearest_encodable(value: float, genes: GeneRange) -> float:
