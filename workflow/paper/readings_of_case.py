@@ -46,7 +46,8 @@ def identify_reading(case: Case, reading: str, target: Path, rows: Path) -> None
 def _rows(case: Case, name: str, time_s: Array, clean: Array) -> Iterator[tuple[str | int, ...]]:
     progress, experiment = Progress(f"{case.name}, {name}", case.seeds), case.experiment
     for seeds in groups(range(case.seeds)):
-        traces = [add_noise(clean, case.noise, experiment.stream("noise", s), time_s) for s in seeds]
+        rngs = [experiment.stream("noise", seed) for seed in seeds]
+        traces = [add_noise(clean, case.noise, rng, time_s) for rng in rngs]
         answers = _best(case, name, seeds, experiment.of_each(time_s, traces))
         for seed, trace, answer in zip(seeds, traces, answers, strict=True):
             names = experiment.searched.names

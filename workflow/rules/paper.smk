@@ -201,7 +201,8 @@ rule claims:
     params:
         **settings_of(
             *"study_seed methods seeds evaluation actuator gripper readings".split(),
-            *keys_of_cases(STUDY, "title", "published", "gripper", "calibration", *SAMPLE, NOISE),
+            *keys_of_cases(STUDY, *FIT, "title", "published", "calibration", "models"),
+            *keys_of_cases(STUDY, *SAMPLING, NOISE),
         ),
     message:
         "Judging the claims of the paper"
