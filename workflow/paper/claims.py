@@ -273,7 +273,8 @@ def judge_grippers(
     """
     judged = []
     for case in results.study.cases.values():
-        reading = simulated_response(case.gripper, case.network, case.torque, case.times_s)[0]
+        device = case.gripper, case.network, case.torque
+        reading = simulated_response(*device, case.times_s, nonlinear=False)[0]
         noise = replace(case.noise, level_rad=rms(standard_deviation(reading, case.noise)))
         every = []
         for gripper in (case.gripper, *others(results, case.gripper)):

@@ -133,7 +133,7 @@ OTHERS = [
 ]
 OTHER_TABLES += ["protocols"] * bool(OTHERS)
 GRIPPER_FIGURES = ["comb", "linkage", "torque"] if HAS_GRIPPER else []
-PAPER_FIGURES = ["protocols"] * bool(OTHERS)
+PAPER_FIGURES = ["protocols"] * bool(OTHERS) + ["referee"] * (len(STUDY.config.readings) > 1)
 FIGURES = ["answer"] if ANSWERED else []
 FIGURES += ["moduli", "overview"] if STUDY.simulated else []
 

@@ -144,6 +144,7 @@ rule readings:
         readings="results/tables/readings.csv",
         found="results/tables/readings_found.csv",
         pages=[page_of_table(name) for name in ("readings", "readings_found")],
+        figure=drawing("referee"),
     log:
         "results/logs/readings.log",
     params:

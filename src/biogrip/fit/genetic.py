@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from biogrip.arrays import Array, IntArray
-from biogrip.digits import counted
 from biogrip.fit.genome import Chromosomes, Genome
 from biogrip.fit.problem import Fit, History, Progress, Row, TraceProblem, silent
 from biogrip.keys import Block, Complaint
@@ -43,11 +42,9 @@ class GeneticSettings(Block):
     mating: Literal["pairs", "rank"]
     """`pairs`: survivors form random disjoint pairs; `rank`: parents are drawn with a probability
     proportional to their rank."""
-    first_cut: Annotated[int, Field(ge=1, le=50)]
-    """Smallest number of genes that a child takes from its first parent."""
-    last_cut: Annotated[int, Field(ge=-50, le=50)]
-    """Largest number of genes that a child takes from its first parent. Negative numbers count from
-    the end; -1 is one less than the chromosome has, 11 with twelve genes."""
+    cut: Literal["once", "between", "each"]
+    """`once`: one crossover cut, anywhere; `between`: one, between parameters; `each`: one in every
+    parameter."""
     mutation_start: Annotated[int, Field(ge=1, le=_MOST)]
     """First generation whose children mutate."""
     mutation_probability: Annotated[float, Field(ge=0, le=1)]
@@ -62,9 +59,6 @@ class GeneticSettings(Block):
     """Most generations."""
     mutants: Literal["children", "all"] = "children"
     """Individuals that may mutate: `children`; or `all`, survivors except the best, too."""
-    cut: Literal["once", "between", "each"] = "once"
-    """`once`: one crossover cut, anywhere from first to last; `between`: one, between parameters;
-    `each`: one in every parameter."""
 
     def complaints(self) -> Iterator[Complaint]:
         """Find settings that leave no children, or whose limits of generations conflict."""
@@ -74,13 +68,6 @@ class GeneticSettings(Block):
         if self.min_generations > self.max_generations:
             text = f"found {self.min_generations}, allowed is at most max_generations"
             yield ("min_generations",), f"{text}, which is {self.max_generations}."
-
-    def complaints_of(self, genes: int) -> Iterator[Complaint]:
-        """Find crossover cuts that a chromosome of `genes` genes cannot have."""
-        last = self.last_cut if self.last_cut > 0 else genes + self.last_cut
-        if genes and not 1 <= self.first_cut <= last:
-            text = f"found {self.first_cut}, allowed is 1 to last_cut, "
-            yield ("first_cut",), f"{text}which is {last} of {counted(genes, 'gene')} here."
 
 
 def identify_many(
@@ -226,11 +213,8 @@ def _cuts(
         return np.repeat(ends - genome.sizes + within, genome.sizes, axis=1)
     if settings.cut == "between" and len(ends) > 1:
         return rng.choice(ends[:-1], size=(pairs, 1))
-    first, last = (
-        min(cut if cut > 0 else genome.genes + cut, genome.genes - 1)
-        for cut in (settings.first_cut, settings.last_cut)
-    )
-    return rng.integers(min(first, last), last, size=(pairs, 1), endpoint=True)
+    last = genome.genes - 1
+    return rng.integers(min(1, last), last, size=(pairs, 1), endpoint=True)
 
 
 def mutate(

@@ -174,10 +174,6 @@ class CaseBlock(Shared):
         yield from self._instrument_complaints()
         if model.power_law and not self.recorded:
             yield from self._band_complaints()
-        # A chromosome has the digits and the exponent, or the bits, of every parameter.
-        ranges = [getattr(self.search_range, p.range_name) for p in self.searched]
-        genes = sum(len(each.bounds[0]) for each in ranges)
-        yield from below(("genetic_algorithm",), self.genetic_algorithm.complaints_of(genes))
         if self.assumed_gripper == CALIBRATED:
             arms = self.gripper.left, self.gripper.right
             yield from below(("calibration",), self.calibration.complaints_of(arms))
