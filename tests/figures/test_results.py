@@ -11,16 +11,15 @@ from biogrip.figures.fit import Fit, draw_fit, scale_of
 from biogrip.figures.likelihood import draw_profile
 from biogrip.figures.style import figure, save, styled
 from biogrip.physics.instruments import MODULUS
-from biogrip.physics.models import MODELS, Sample
+from biogrip.physics.models import MODELS
 from biogrip.records import write_object
 from biogrip_study.figures.case_fit import draw_fits
-from biogrip_study.figures.case_likelihood import draw_valley
 from biogrip_study.figures.course import draw_convergence, draw_scatter
 from biogrip_study.methods.registry import METHODS
 from biogrip_study.records.rows import write_arrays
 from biogrip_study.records.traces import Measurements, write_measurements
 from biogrip_study.stages import targets
-from tests.helpers.default import STUDY, seen, study_of
+from tests.helpers.default import STUDY, study_of
 from tests.helpers.problems import rotation
 from workflow.paper.gripper import draw_torque
 
@@ -137,53 +136,6 @@ def test_a_set_in_two_parts_is_shaded_in_two_parts() -> None:
     spans = [patch for patch in axes.patches if isinstance(patch, Rectangle)]
     edges = [(patch.get_x(), patch.get_x() + patch.get_width()) for patch in spans]
     assert edges == [(1.2, 1.9), (2.1, pytest.approx(3.3))]
-
-
-def drawn_valley(
-    folder: Path, increases: list[list[float]], fits: dict[str, list[float]], **known: Any
-) -> Any:
-    """Axes of a valley along the sum of 10, with sums of 9, 10 and 11."""
-    shares = np.linspace(0.1, 0.9, 5)
-    sums = 10 * np.array([[0.9], [1.0], [1.1]])
-    grid = {"x_values": sums * shares, "y_values": sums * (1 - shares), "increases": increases}
-    axis = {"name": "c", "symbol": "$c$", "unit": "N s/m"}
-    other = {**axis, "name": "c_p", "symbol": "$c_p$"}
-    grids = [{key: np.asarray(each).tolist() for key, each in grid.items()}]
-    path, valley = folder / "v.json", {"x": axis, "y": other, "grids": grids, "best": [9.0, 1.0]}
-    write_object(path, {"valley": valley})
-    ends: dict[str, Any] = {f"{name}_Ns_per_m": values for name, values in fits.items()}
-    found = identified(folder, "least_squares", **ends)
-    study = seen(fitting_method=METHODS["least_squares"], config=seen(methods=["least_squares"]))
-    known |= {"name": "x", "seeds": len(fits["c"]), "sample": Sample(MODEL.name), "study": study}
-    paper = seen(identified=known.get("paper", {}))
-    case = seen(title="A drop", parameters=known.get("truth", {}), published=paper, **known)
-    with styled():
-        return draw_valley(case, path, found).axes[0]
-
-
-DEEP = [[50.0] * 5, [0.0] * 5, [60.0] * 5]
-# Deep at its last point alone, where c is 9.
-CLOSED = [[900.0] * 5, [900.0, 900.0, 900.0, 900.0, 0.0], [900.0] * 5]
-
-
-def test_a_valleys_axes_end_around_what_is_in_it(tmp_path: Path) -> None:
-    """Fits, truth, paper and where it is deep; each of them widens the axes, none is cut off."""
-    near = {"c": [8.9, 9.05], "c_p": [1.1, 0.95]}
-    narrow = drawn_valley(tmp_path, CLOSED, near)
-    # The root of the rise, 30 at the next point, (7, 3), is below that of 10.83 for 0.11 of the way
-    # there, which is as far as (8.78, 1.22); the fits end at (9.05, 0.95).
-    low, high = narrow.get_xlim()
-    assert 8.5 < low < 8.78 < 9.05 < high < 9.3
-    low, high = narrow.get_ylim()
-    assert 0.7 < low < 0.95 < 1.22 < high < 1.5
-    low, high = drawn_valley(tmp_path, DEEP, near).get_xlim()
-    assert low < 1 < 9 < high
-    known = {"c": 6.0, "c_p": 4.0}
-    more = drawn_valley(tmp_path, CLOSED, {"c": [6.0, 9.05], "c_p": [4.0, 0.95]})
-    true, published = {"truth": known}, {"paper": known}
-    for axes in (more, *(drawn_valley(tmp_path, CLOSED, near, **it) for it in (true, published))):
-        assert axes.get_xlim()[0] < 6 < 9.05 < axes.get_xlim()[1]
-        assert axes.get_ylim()[0] < 0.95 < 4 < axes.get_ylim()[1]
 
 
 def test_a_figure_for_print_has_fonts_that_publishers_take(tmp_path: Path) -> None:

@@ -33,8 +33,8 @@ CHANGES: dict[str, tuple[dict[str, Any], dict[str, int]]] = {
     ),
     "a case, and the title of another": (
         {"cases": {"new": CELL, "liquid_drop_2": {"title": "A drop"}}},
-        {"target": 1, "mechanics": 1, "linearisation": 1, "case_tables": 2, "case_figures": 1}
-        | {"case_figures_without_valley": 1, "gripper_figures": 1}
+        {"target": 1, "mechanics": 1, "linearisation": 1, "case_tables": 2, "case_figures": 2}
+        | {"gripper_figures": 1}
         | TRACES
         | STUDY,
     ),

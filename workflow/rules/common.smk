@@ -108,7 +108,7 @@ SIMULATED = [*STUDY.simulated, *STUDY.points]
 EVERY = [*STUDY.cases, *STUDY.points]
 CALIBRATED = [n for n in EVERY if STUDY.case(n).block.assumed_gripper == "calibrated"]
 SELECTING = list(STUDY.cases) if STUDY.config.model_selection.models else []
-ANSWERED = [name for name in STUDY.gripped if STUDY.case(name).has_valley][-1:]
+ANSWERED = [name for name in STUDY.gripped if STUDY.case(name).has_trade_off][-1:]
 calibration_of = of_case("results/calibrations/{case}.yaml", CALIBRATED)
 
 # Tables and figures of the study, of what there is in it, and those of a case.
@@ -125,7 +125,7 @@ EVIDENCE = ["evidence", "printed_values", "sampling_evidence"]
 OTHER_TABLES = [*INPUTS, *(["contact", "left_out"] if HAS_GRIPPER else [])]
 OTHER_TABLES += ["linearisation", "mechanics", "contact_loss"] if STUDY.gripped else []
 OTHER_TABLES += ["claims", "tables_5_to_7", *EVIDENCE] if STUDY.published else []
-OTHER_TABLES += ["readings", "readings_found"] * bool(STUDY.config.readings)
+OTHER_TABLES += ["readings", "readings_found"] * (len(STUDY.config.readings) > 1)
 # The paper's samples under other protocols, and these under its own.
 KNOWN = [STUDY.case(name).parameters for name in STUDY.published]
 OTHERS = [
@@ -133,16 +133,15 @@ OTHERS = [
 ]
 OTHER_TABLES += ["protocols"] * bool(OTHERS)
 GRIPPER_FIGURES = ["comb", "linkage", "torque"] if HAS_GRIPPER else []
-PAPER_FIGURES = ["protocols"] * bool(OTHERS)
+PAPER_FIGURES = ["protocols"] * bool(OTHERS) + ["referee"] * (len(STUDY.config.readings) > 1)
 FIGURES = ["answer"] if ANSWERED else []
 FIGURES += ["moduli", "overview"] if STUDY.simulated else []
 
 
-def case_figure_names(simulated, valley):
-    """Names of the figures of a case, by whether it is simulated, and searched for c and c_p."""
+def case_figure_names(simulated):
+    """Names of the figures of a case, by whether it is simulated."""
     drawn = ["convergence", "evolution", "fit", "judged_fit", "profiles"]
-    drawn += ["force", "scatter", "waterfall"] if simulated else []
-    return drawn + ["valley"] if valley else drawn
+    return drawn + ["force", "scatter", "waterfall"] * simulated
 
 
 # All of them with the case or the sweep that they are of.
@@ -158,7 +157,7 @@ SHOWN = {
         *(
             (name, case)
             for case, its in STUDY.cases.items()
-            for name in case_figure_names(not its.recorded, its.has_valley)
+            for name in case_figure_names(not its.recorded)
         ),
         *(("robustness", sweep) for sweep in STUDY.config.sweeps),
     ],

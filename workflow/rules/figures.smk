@@ -1,14 +1,14 @@
 """The figures: of each case with its summary, and of the study; and the page with all of them."""
 
 
-def case_figures(simulated, valley):
+def case_figures(simulated):
     """The files of the figures of a case, and its summary."""
-    drawn = case_figure_names(simulated, valley)
+    drawn = case_figure_names(simulated)
     summary = shown("results/summaries/{case}.html", "pages", "summary", "{case}")
     return [*(file for name in drawn for file in drawing(name, "{case}")), summary]
 
 
-# Of a recorded trace nobody knows the target; a valley has who searches for c and c_p.
+# Of a recorded trace nobody knows the target.
 rule case_figures:
     input:
         identifications="results/identifications/{case}.csv",
@@ -19,13 +19,13 @@ rule case_figures:
         target=of_case("results/targets/{case}.csv", STUDY.simulated),
         calibrated=calibration_of,
     output:
-        *case_figures(simulated=True, valley=True),
+        *case_figures(simulated=True),
     log:
         "results/logs/case_figures/{case}.log",
     benchmark:
         "results/benchmarks/case_figures/{case}.tsv"
     wildcard_constraints:
-        case=names(case for case in STUDY.simulated if STUDY.case(case).has_valley),
+        case=names(STUDY.simulated),
     params:
         **settings_of(
             *"actuator methods seeds evaluation title published contact models".split(),
@@ -37,25 +37,11 @@ rule case_figures:
         "../scripts/case_figures.py"
 
 
-use rule case_figures as case_figures_without_valley with:
-    output:
-        *case_figures(simulated=True, valley=False),
-    wildcard_constraints:
-        case=names(case for case in STUDY.simulated if not STUDY.case(case).has_valley),
-
-
 use rule case_figures as recorded_case_figures with:
     output:
-        *case_figures(simulated=False, valley=True),
+        *case_figures(simulated=False),
     wildcard_constraints:
-        case=names(case for case in STUDY.recorded if STUDY.case(case).has_valley),
-
-
-use rule case_figures as recorded_case_figures_without_valley with:
-    output:
-        *case_figures(simulated=False, valley=False),
-    wildcard_constraints:
-        case=names(case for case in STUDY.recorded if not STUDY.case(case).has_valley),
+        case=names(STUDY.recorded),
 
 
 rule figures:

@@ -14,7 +14,6 @@ DRAWINGS = {
     "fit": case_fit.draw_fits,
     "judged_fit": case_fit.draw_judged_fit,
     "profiles": case_likelihood.draw_profiles,
-    "valley": case_likelihood.draw_valley,
     "force": case_fit.draw_force,
     "scatter": course.draw_scatter,
 }
@@ -28,5 +27,5 @@ with logged(snakemake):
             with styled():
                 save(draw(**arguments(snakemake, draw)), *files)
             drawn[name] = files[0]
-    shown = [drawn[name] for name in ("judged_fit", "profiles", "valley") if name in drawn]
+    shown = [drawn[name] for name in ("judged_fit", "profiles") if name in drawn]
     write_summary(case, Path(snakemake.input.verdicts), shown, summary)

@@ -121,11 +121,6 @@ class CaseBlock(Shared, SampleBlocks):
         yield from self._instrument_complaints()
         if self.sample.sample.model.power_law and not self.recorded:
             yield from self._band_complaints()
-        # A chromosome has the digits and the exponent of every parameter.
-        ranges = [getattr(self.search_range, p.range_name) for p in self.searched]
-        genes = sum(each.digits + 1 for each in ranges)
-        genetic = self.method("genetic")
-        yield from below(("genetic_algorithm",), genetic.complaints_of(genes))
         if self.assumed_gripper == CALIBRATED:
             arms = self.gripper.left, self.gripper.right
             yield from below(("calibration",), self.calibration.complaints_of(arms))

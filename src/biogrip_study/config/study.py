@@ -76,7 +76,7 @@ class Case(SampleCase):
         return self.gripper
 
     @property
-    def has_valley(self) -> bool:
+    def has_trade_off(self) -> bool:
         """True if two exchangeable parameters are searched, and others besides."""
         searched = [parameter.name for parameter in self.block.searched]
         pair = {*self.sample.model.exchangeable} & {*searched}

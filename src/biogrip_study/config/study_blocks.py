@@ -236,6 +236,10 @@ class ReadingBlock(Block):
     """Name in print."""
     changes: Mapping[str, Any]
     """Merged into each case, with keys of a case, e.g. `genetic_algorithm: {patience: 60}`."""
+    runs: Annotated[int, Field(ge=1, le=100)] = 1
+    """Number of runs on a trace, the best of which is shown."""
+    polished: bool = False
+    """A local fit follows the algorithm."""
 
 
 @dataclass(frozen=True)

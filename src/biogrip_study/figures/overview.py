@@ -153,7 +153,7 @@ def draw_answer(case: Case, verdicts: Path, measurements: Path, calibrated: list
     handles, _ = trace.get_legend_handles_labels()
     trace.legend(handles[::2], ["trace", "fit"], loc="upper right", ncols=2, columnspacing=1)
     style.panel(trace, "2", "one of them turns")
-    names = [found["valley"][axis]["name"] for axis in "xy"]
+    names = [name for name in case.sample.model.names if name in case.sample.model.exchangeable]
     for number, axes, name in zip("34", profiles, (" + ".join(names), names[1]), strict=True):
         draw_profile(axes, items[name])
         axes.axhline(found["threshold"], color=style.BLACK, linestyle="--", linewidth=0.7)

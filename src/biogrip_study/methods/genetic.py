@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from biogrip.arrays import Array, IntArray
-from biogrip.digits import counted
 from biogrip.fit.problem import Fit, History, Progress, Row, TraceProblem, silent
 from biogrip.keys import Block, Complaint
 from biogrip_study.methods.genome import Chromosomes, Genome, make_genome
@@ -43,11 +42,9 @@ class GeneticSettings(Block):
     mating: Literal["pairs", "rank"]
     """`pairs`: survivors form random disjoint pairs; `rank`: parents are drawn with a probability
     proportional to their rank."""
-    first_cut: Annotated[int, Field(ge=1, le=50)]
-    """Smallest number of genes that a child takes from its first parent."""
-    last_cut: Annotated[int, Field(ge=-50, le=50)]
-    """Largest number of genes that a child takes from its first parent. Negative numbers count from
-    the end; -1 is one less than the chromosome has, 11 with twelve genes."""
+    cut: Literal["once", "between", "each"]
+    """`once`: one crossover cut, anywhere; `between`: one, between parameters; `each`: one in every
+    parameter."""
     mutation_start: Annotated[int, Field(ge=1, le=_MOST)]
     """First generation whose children mutate."""
     mutation_probability: Annotated[float, Field(ge=0, le=1)]
@@ -71,13 +68,6 @@ class GeneticSettings(Block):
         if self.min_generations > self.max_generations:
             text = f"found {self.min_generations}, allowed is at most max_generations"
             yield ("min_generations",), f"{text}, which is {self.max_generations}."
-
-    def complaints_of(self, genes: int) -> Iterator[Complaint]:
-        """Find crossover cuts that a chromosome of `genes` genes cannot have."""
-        last = self.last_cut if self.last_cut > 0 else genes + self.last_cut
-        if genes and not 1 <= self.first_cut <= last:
-            text = f"found {self.first_cut}, allowed is 1 to last_cut, "
-            yield ("first_cut",), f"{text}which is {last} of {counted(genes, 'gene')} here."
 
 
 def identify_many(
@@ -135,7 +125,7 @@ def evolve(
             if not len(running):
                 break
         own_rngs = [rngs[population] for population in running.tolist()]
-        children, before = cross(survivors, settings, own_rngs), ranking[:, 0]
+        children, before = cross(survivors, genome, settings, own_rngs), ranking[:, 0]
         if generation >= settings.mutation_start:
             mutate(children, genome, settings, own_rngs)
             if settings.mutants == "all":
@@ -182,23 +172,21 @@ def _taken(individuals: NDArray[Any], which: IntArray) -> NDArray[Any]:
 
 
 def cross(
-    parents: Chromosomes, settings: GeneticSettings, rngs: Sequence[np.random.Generator]
+    parents: Chromosomes,
+    genome: Genome,
+    settings: GeneticSettings,
+    rngs: Sequence[np.random.Generator],
 ) -> Chromosomes:
     """Produce both children of pairs of parents, (n_populations, n, n_genes), best first."""
     populations, count, genes = parents.shape
     n_children = settings.population - settings.survivors
     pairs = -(-n_children // 2)
-    first, last = (
-        min(cut if cut > 0 else genes + cut, genes - 1)
-        for cut in (settings.first_cut, settings.last_cut)
-    )
     mates = np.empty((populations, pairs, 2), dtype=np.int64)
-    cuts = np.empty((populations, pairs, 1), dtype=np.int64)
+    head = np.empty((populations, pairs, genes), dtype=bool)
     for row, rng in enumerate(rngs):
         mates[row] = _mates(count, pairs, settings, rng)
-        cuts[row, :, 0] = rng.integers(min(first, last), last, size=pairs, endpoint=True)
+        head[row] = np.arange(genes) < _cuts(pairs, genome, settings, rng)
     mothers, fathers = (_taken(parents, mates[:, :, parent]) for parent in (0, 1))
-    head = np.arange(genes) < cuts
     children = np.where(head, mothers, fathers), np.where(head, fathers, mothers)
     return np.concatenate(children, axis=1)[:, :n_children]
 
@@ -213,6 +201,20 @@ def _mates(
     even = parents // 2 * 2
     rounds = [rng.permutation(parents)[:even] for _ in range(-(-2 * pairs // even))]
     return np.concatenate(rounds)[: 2 * pairs].reshape(pairs, 2)
+
+
+def _cuts(
+    pairs: int, genome: Genome, settings: GeneticSettings, rng: np.random.Generator
+) -> IntArray:
+    """Draw where genes of the first parent end, (pairs, 1), or in each parameter, (pairs, n)."""
+    ends = np.cumsum(genome.sizes)
+    if settings.cut == "each":
+        within = rng.integers(0, genome.sizes, size=(pairs, len(ends)), endpoint=True)
+        return np.repeat(ends - genome.sizes + within, genome.sizes, axis=1)
+    if settings.cut == "between" and len(ends) > 1:
+        return rng.choice(ends[:-1], size=(pairs, 1))
+    last = genome.genes - 1
+    return rng.integers(min(1, last), last, size=(pairs, 1), endpoint=True)
 
 
 def mutate(

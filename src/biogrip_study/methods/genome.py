@@ -25,8 +25,10 @@ class Genome:
     high: IntArray
     """Largest one, included, (n_genes,)."""
     sizes: tuple[int, ...]
-    """Number of genes of each parameter, (n_parameters,): its exponent and digits, in this
-    order."""
+    """Number of genes of each parameter, (n_parameters,): its exponent and digits, in this order,
+    or its bits."""
+    binary: tuple[tuple[int, GeneRange], ...] = ()
+    """Index and range of each parameter that has bits."""
 
     @property
     def genes(self) -> int:
@@ -49,6 +51,10 @@ class Genome:
         parameters: Array = chromosomes @ self._places
         parameters *= _TIMES.take(powers)
         parameters /= _OVER.take(powers)
+        for parameter, genes in self.binary:
+            first = self._exponents[parameter]
+            bits = chromosomes[..., first : first + genes.bits]
+            parameters[..., parameter] = of_bits(genes, bits)
         return parameters
 
     def keys(self, chromosomes: Chromosomes) -> list[Array]:
@@ -95,19 +101,33 @@ _OVER = np.array([10.0 ** max(-power, 0) for power in _POWERS])
 
 def make_genome(ranges: Sequence[GeneRange]) -> Genome:
     """Return the genome of parameters, from the gene range of each."""
-    low = np.concatenate([genes.least for genes in ranges])
-    high = np.concatenate([genes.most for genes in ranges])
-    return Genome(low, high, tuple(genes.digits + 1 for genes in ranges))
+    low, high = (np.concatenate(ends) for ends in zip(*(g.bounds for g in ranges), strict=True))
+    sizes = tuple(len(genes.bounds[0]) for genes in ranges)
+    return Genome(low, high, sizes, tuple((i, g) for i, g in enumerate(ranges) if g.bits))
 
 
 def encodable_values(genes: GeneRange) -> Array:
     """Return all positive values that genes can encode, ascending, each the nearest double."""
+    if genes.bits:
+        return _between(genes, np.arange(2**genes.bits))
     mantissas = np.zeros(1)
     for least, most in zip(genes.least[1:], genes.most[1:], strict=True):
         mantissas = (10 * mantissas[:, None] + np.arange(least, most + 1)).ravel()
     powers = np.arange(genes.exponent[0], genes.exponent[1] + 1) - genes.digits + _LARGEST_POWER
     values: Array = mantissas * _TIMES[powers, None] / _OVER[powers, None]
     return np.unique(values[values > 0]) if genes.least[1] == 0 else values.ravel()
+
+
+def of_bits(genes: GeneRange, bits: Chromosomes) -> Array:
+    """Decode bits, (..., n_bits), the largest first, into a value each."""
+    plain = np.bitwise_xor.accumulate(bits, axis=-1) if genes.gray else bits
+    return _between(genes, plain @ (1 << np.arange(genes.bits)[::-1]))
+
+
+def _between(genes: GeneRange, numbers: IntArray) -> Array:
+    low, high = np.log([genes.low, genes.high])
+    values: Array = np.exp(low + (high - low) * numbers / (2**genes.bits - 1))
+    return values
 
 
 def nearest_encodable(value: float, genes: GeneRange) -> float:

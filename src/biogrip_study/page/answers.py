@@ -165,26 +165,6 @@ def say_which_method_finds_it(methods: Iterable[Row], shown: str) -> str:
     return f"{said}."
 
 
-def say_what_claims_are(claims: Iterable[Row]) -> str:
-    """Say how many of the paper's statements have each verdict; "" if there are none."""
-    counts = Counter(row["verdict"] for row in claims)
-    judged = {verdict: count for verdict, count in counts.items() if verdict not in UNJUDGED}
-    if not judged:
-        return ""
-    listed = [f"{counts[verdict]} {verdict}" for verdict in _CLAIMED if counts[verdict]]
-    others = f"; {counts[_ELSEWHERE]} more take another config" if counts[_ELSEWHERE] else ""
-    return (
-        f"Of the paper's claims, each counted once for every sample and quantity, "
-        f"{sum(judged.values())} are judged: {', '.join(listed)}{others}."
-    )
-
-
-_ELSEWHERE = "judged elsewhere"
-UNJUDGED = "not judged", _ELSEWHERE
-"""Verdicts of claims that do not count: nothing can contradict them, or another config judges."""
-_CLAIMED = "replicated", "in part", "not", "too few runs to tell", "cannot be told"
-
-
 def rows_beside_the_paper(
     compared: Iterable[Row], titles: Mapping[str, str]
 ) -> list[dict[str, str]]:
@@ -194,7 +174,7 @@ def rows_beside_the_paper(
     of that name.
     """
     rows = list(compared)
-    told = {row["quantity"] for row in rows if row["verdict"] != "cannot be told"}
+    told = {row["quantity"] for row in rows if row["verdict"] != "not identifiable"}
     return [
         {
             "sample": titles[row["case"]],

@@ -33,7 +33,7 @@ _LIBRARIES = ("numpy", "scipy", "pandas", "matplotlib", "snakemake")
 # Tables, or beginnings of their names, that answers are written from.
 _ANSWERING = (
     *("errors.csv", "verdicts_", "coverage.csv"),
-    *("methods.csv", "claims.csv", "tables_5_to_7.csv", "models.csv"),
+    *("methods.csv", "tables_5_to_7.csv", "models.csv"),
 )
 # Tables under what is reconstructed; the others are under their heading.
 _EVIDENCE = ("gripper", "gene_ranges", "evidence", "printed_values")
@@ -109,7 +109,7 @@ def write_report(
     movable = [(case, of) for case, of in measured if study.published and has_sliders(case)]
     # Where the branch relaxes fastest, its damper and the parallel one are told apart least.
     movable.sort(key=lambda it: it[0].parameters["c"] / it[0].parameters["k"])
-    errors, judged, covered, compared, claimed, beside, models = (
+    errors, judged, covered, compared, beside, models = (
         [row for csv in downloads if csv.name.startswith(name) for row in read_table(csv)]
         for name in _ANSWERING
     )
@@ -147,7 +147,6 @@ def write_report(
             answers.say_what_traces_tell(covered, titles),
             answers.say_what_the_study_gives(*asked, titles, who, study.optimum_tolerance),
             answers.say_which_method_finds_it(*asked),
-            answers.say_what_claims_are(claimed),
         ],
         "compared": answers.rows_beside_the_paper(beside, titles)
         or answers.compared_rows(errors, judged, titles),

@@ -62,9 +62,9 @@ READINGS = RowFile(
 
 
 def read_readings(path: Path, case: Case) -> "pd.DataFrame":
-    """Read what every reading found of a case, in all seeds; parameters stand by name."""
-    names, seeds = case.study.config.readings, range(case.seeds)
-    found = READINGS.read(path, case=[case.name], reading=names, seed=seeds)
+    """Read what the reading that a file is named like found; parameters stand by name."""
+    seeds = range(case.seeds)
+    found = READINGS.read(path, case=[case.name], reading=[path.stem], seed=seeds)
     return found.rename(columns={p.column: p.name for p in SINGLE_BRANCH})
 
 

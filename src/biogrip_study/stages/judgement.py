@@ -45,13 +45,12 @@ TRACE = 0
 
 
 def judge(case: Case, measurements: Path, calibrated: list[Path], verdicts: Path) -> None:
-    """Identify the trace of seed 0, and write verdicts, profiles and valley."""
+    """Identify the trace of seed 0, and write verdicts and profiles."""
     recorded = read_measurements(measurements, [TRACE])
     experiment = experiment_for(case.judged_experiment, recorded, calibrated)
-    (diagnosis,) = identify_alike([(recorded.recording, experiment)], valley=True)
+    (diagnosis,) = identify_alike([(recorded.recording, experiment)])
     assert diagnosis.fit
-    more = {"noise_model": diagnosis.fit.noise_data(), "valley": diagnosis.valley}
-    _write(verdicts, case, diagnosis, more)
+    _write(verdicts, case, diagnosis, {"noise_model": diagnosis.fit.noise_data()})
 
 
 def expect(case: Case, target: Path, calibrated: list[Path], expected: Path) -> None:
