@@ -152,7 +152,7 @@ def test_prefixes_dollars_and_methods() -> None:
     assert {value: scale_of(np.array([-value, 0.0]), "rad") for value in scales} == scales
     assert style.literal("5$ a day") == r"5\$ a day"
     assert len({it.color for it in METHODS.values()}) == len(METHODS)
-    assert [it.dashes for it in METHODS.values()] == ["-", "-", "--", "-."]
+    assert [it.dashes for it in METHODS.values()] == ["-", "--"]
 
 
 def test_points_beyond_an_axis_are_triangles_at_its_edge() -> None:

@@ -12,7 +12,7 @@ from biogrip.fit.problem import Fit, History, TraceProblem
 from biogrip.fit.search_range import GeneRange
 from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.sample_model import with_fixed
-from biogrip_study.methods import genetic, genetic_refined
+from biogrip_study.methods import genetic
 from biogrip_study.methods.genetic import GeneticSettings, select
 from biogrip_study.methods.genome import (
     Genome,
@@ -182,14 +182,6 @@ def test_populations_are_what_they_are_alone_and_gene_by_gene(name: str) -> None
         rngs = [rng_of(seed) for seed in group]
         found = genetic.identify_many([problems[seed] for seed in group], settings, rngs)
         assert [content(answer) for answer in found] == [plain[seed] for seed in group]
-
-
-def test_polished_populations_are_as_if_alone() -> None:
-    settings = replace(SMALL, max_generations=8), genetic_refined.Polishing(2, 1)
-    problems, polished = posed(2), genetic_refined.identify_many
-    alone = [polished([p], settings, [rng_of(s)])[0] for s, p in enumerate(problems)]
-    found = polished(problems, settings, [rng_of(0), rng_of(1)])
-    assert [content(answer) for answer in found] == [content(answer) for answer in alone]
 
 
 def test_genes_are_drawn_uniformly_from_their_whole_range() -> None:

@@ -14,7 +14,7 @@ from biogrip.physics.gripper import torque
 from biogrip.physics.noise import Noise
 from biogrip_study.config.case_blocks import OVERRIDABLE
 from biogrip_study.config.study import DEFAULTS, Study, load_given_study, load_study
-from biogrip_study.methods.registry import SETTINGS
+from biogrip_study.methods.registry import METHODS
 from tests.helpers.key_reference import STUDY, file_schema, leaves
 from tests.helpers.places import CONFIG, ROOT
 
@@ -229,7 +229,7 @@ def test_every_block_refuses_unknown_keys() -> None:
 
 
 def test_a_case_may_override_the_blocks_of_the_study_and_of_every_method() -> None:
-    methods = {*SETTINGS}
+    methods = {method.key for method in METHODS.values()}
     assert methods < set(OVERRIDABLE)
     assert set(OVERRIDABLE) == set(STUDY.keys["cases"].values.keys) & set(STUDY.keys)
 

@@ -90,7 +90,7 @@ rule identification:
         runtime=120,
     params:
         **settings_of("study_seed", "actuator", *FIT),
-        method=lambda wildcards: settings(STUDY, METHODS[wildcards.method].settings, wildcards.case),
+        method=lambda wildcards: settings(STUDY, [METHODS[wildcards.method].key], wildcards.case),
         stages=["biogrip_study.stages.identification.identify"],
     message:
         "Identifying {wildcards.case} by {wildcards.method}, {wildcards.batch}"

@@ -23,7 +23,7 @@ from biogrip.physics.gripper import Gripper
 from biogrip.physics.noise import MOST_SAMPLES
 from biogrip_study.config.published import Published
 from biogrip_study.gripper.calibration import CalibrationTest
-from biogrip_study.methods.registry import METHODS, SETTINGS
+from biogrip_study.methods.registry import METHODS
 
 CALIBRATED = "calibrated"
 
@@ -61,7 +61,8 @@ def _of_methods() -> type[Block]:
         needed = [key for key in fields(kind) if key.default is key.default_factory is MISSING]
         return field() if needed else field(default_factory=kind)
 
-    blocks = [(name, kind, default(kind)) for name, kind in SETTINGS.items()]
+    kinds = {method.key: method.settings for method in METHODS.values()}
+    blocks = [(name, kind, default(kind)) for name, kind in kinds.items()]
     return make_dataclass("_MethodBlocks", blocks, bases=(Block,), frozen=True, kw_only=True)
 
 
@@ -87,9 +88,8 @@ class Shared(_MethodBlocks, ExperimentBlocks):
     identifiability: Identifiability
 
     def method(self, name: str) -> Any:
-        """Return the settings of a method, of several blocks as a tuple."""
-        blocks = tuple(getattr(self, key) for key in METHODS[name].settings)
-        return blocks if len(blocks) > 1 else blocks[0]
+        """Return the settings of a method."""
+        return getattr(self, METHODS[name].key)
 
 
 OVERRIDABLE = tuple(block.name for block in fields(Shared))

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from biogrip.arrays import Array
 from biogrip.figures import style
 from biogrip.figures.fit import Fit, draw_fit, fit_of, scale_of
+from biogrip.figures.likelihood import draw_profiles_of
 from biogrip.fit.experiment import Experiment
 from biogrip_study.config.study import Case
 from biogrip_study.gripper.simulation import jaw_force
@@ -84,6 +85,12 @@ def draw_judged_fit(
     fit = judged_fit(case, read_verdicts(verdicts), measurements[0], calibrated)
     trace = "recorded trace" if case.recorded else f"seed {TRACE}"
     return draw_fit({f"best fit ({trace})": fit}, case.title, case.published.axis_rad)
+
+
+def draw_profiles(case: Case, verdicts: Path, expected: list[Path]) -> Figure:
+    """Draw the profile of every quantity of a case, with confidence limits."""
+    others = [read_verdicts(path) for path in expected]
+    return draw_profiles_of(read_verdicts(verdicts), others, case.title, case.parameters)
 
 
 def judged_fit(

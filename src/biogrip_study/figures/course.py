@@ -84,7 +84,7 @@ def draw_convergence(case: Case, identifications: Path, history: Path) -> Figure
     label = "noise in the trace" if noisy else "lowest misfit"
     axes.axhline(0, color=style.TARGET, linestyle="--", linewidth=0.8, label=label)
     last = int(histories["generation"].max())
-    if "genetic_algorithm" in method.settings:
+    if method.name == "genetic":
         mutation_start = case.block.method("genetic").mutation_start
         if mutation_start <= last:
             _mark_mutation(axes, mutation_start, last)
