@@ -84,12 +84,12 @@ class Checked:
 
     @model_validator(mode="after")
     def _refuse_conflicts(self, info: ValidationInfo) -> Self:
-        found: list[Any] = [
+        conflicts: list[Any] = [
             {"type": PydanticCustomError(CONFLICT, text), "loc": path, "input": None}
             for path, text in (self.complaints() if info.context else ())
         ]
-        if found:
-            raise ValidationError.from_exception_data(CONFLICT, found)
+        if conflicts:
+            raise ValidationError.from_exception_data(CONFLICT, conflicts)
         return self
 
 

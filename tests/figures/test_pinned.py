@@ -9,7 +9,6 @@ import pytest
 from PIL import Image
 from scipy.spatial import KDTree
 
-
 PINNED = Path(__file__).with_name("pinned")
 # Size as a share of what is drawn, and colours, in which a line is still a line.
 SIZE, COLOURS = 0.25, 128

@@ -136,13 +136,20 @@ GRIPPER_FIGURES = ["comb", "linkage", "torque"] if HAS_GRIPPER else []
 PAPER_FIGURES = ["protocols"] * bool(OTHERS) + ["referee"] * (len(STUDY.config.readings) > 1)
 FIGURES = ["answer"] if ANSWERED else []
 FIGURES += ["moduli", "overview"] if STUDY.simulated else []
-
-
-def case_figure_names(simulated):
-    """Names of the figures of a case, by whether it is simulated."""
-    drawn = ["convergence", "evolution", "fit", "judged_fit", "profiles"]
-    return drawn + ["force", "scatter", "waterfall"] * simulated
-
+# Those of a case, with the functions that draw them, and the first cases, as many as a page shows.
+OF_EVERY_CASE = {
+    "convergence": "biogrip_study.figures.course.draw_convergence",
+    "evolution": "biogrip_study.figures.course.draw_evolution",
+    "fit": "biogrip_study.figures.case_fit.draw_fits",
+    "judged_fit": "biogrip_study.figures.case_fit.draw_judged_fit",
+    "profiles": "biogrip_study.figures.case_fit.draw_profiles",
+}
+OF_SIMULATED = {
+    "force": "biogrip_study.figures.case_fit.draw_force",
+    "scatter": "biogrip_study.figures.course.draw_scatter",
+    "waterfall": "biogrip_study.figures.course.draw_waterfall",
+}
+FIRST = STUDY.of(STUDY.simulated[:3])
 
 # All of them with the case or the sweep that they are of.
 SHOWN = {
@@ -155,11 +162,10 @@ SHOWN = {
         *((name, "") for name in [*GRIPPER_FIGURES, *PAPER_FIGURES, *FIGURES]),
         *(("linearisation", "") for _ in STUDY.gripped[:1]),
         *(
-            (name, case)
-            for case, its in STUDY.cases.items()
-            for name in case_figure_names(not its.recorded)
+            (name, name_of_case)
+            for name_of_case, case in STUDY.cases.items()
+            for name in [*OF_EVERY_CASE, *([] if case.recorded else OF_SIMULATED)]
         ),
-        *(("robustness", sweep) for sweep in STUDY.config.sweeps),
     ],
 }
 

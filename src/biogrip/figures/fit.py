@@ -85,8 +85,8 @@ def draw_traces(axes: Axes, fits: Mapping[str, Fit]) -> tuple[float, str]:
         axes.plot(
             fit.time_s, factor * fit.target, color=style.TARGET, linewidth=2.4, label="target"
         )
-    for (label, each), color in zip(fits.items(), style.RUNS, strict=False):
-        axes.plot(each.time_s, factor * each.fitted, color=color, label=label)
+    for (label, fitted), color in zip(fits.items(), style.RUNS, strict=False):
+        axes.plot(fitted.time_s, factor * fitted.fitted, color=color, label=label)
     axes.set_ylabel(with_unit(fit.read.title, unit))
     return factor, unit
 

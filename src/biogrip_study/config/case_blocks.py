@@ -184,6 +184,6 @@ class CaseBlock(Shared, SampleBlocks):
         needed = len(self.searched) + sum(measured.along.values()) + 1
         most = MOST_SAMPLES if measured.coloured else _MOST_SAMPLES
         if not needed <= samples <= most:
-            found = f"found {measured.rate_Hz:g}, which gives {counted(f'{samples:.6g}', 'sample')}"
+            said = f"found {measured.rate_Hz:g}, which gives {counted(f'{samples:.6g}', 'sample')}"
             how = " with a coloured noise model" if measured.coloured else ""
-            yield ("rate_Hz",), f"{found} over the protocol; allowed are {needed} to {most}{how}."
+            yield ("rate_Hz",), f"{said} over the protocol; allowed are {needed} to {most}{how}."

@@ -185,17 +185,17 @@ def point_blocks(
     sweeps: Mapping[str, SweepBlock], cases: Mapping[str, CaseBlock]
 ) -> dict[str, dict[str, Any]]:
     """Return the config block of every point's case by name, as plain data, for checked sweeps."""
-    found = {}
+    by_name = {}
     blocks = {name: plain(case) for name, case in cases.items()} if sweeps else {}
     for _, point in list_points(sweeps):
-        found[point.name] = blocks[point.case]
+        by_name[point.name] = blocks[point.case]
         for key, value in (point.row.overrides | point.column.overrides).items():
             # A key that counts takes no 8.0.
             changed: Any = int(value) if isinstance(value, float) and value.is_integer() else value
             for name in reversed(key.split(".")):
                 changed = {name: changed}
-            found[point.name] = overlaid(found[point.name], changed)
-    return found
+            by_name[point.name] = overlaid(by_name[point.name], changed)
+    return by_name
 
 
 def _word(value: float | str) -> str:
@@ -346,8 +346,8 @@ class StudyConfig(Shared):
             ("only",): (self.only, self.cases),
             **{("sweeps", name, "cases"): (s.cases, chosen) for name, s in self.sweeps.items()},
         }
-        for path, (found, allowed) in lists.items():
-            for index, name in enumerate(found):
+        for path, (given, allowed) in lists.items():
+            for index, name in enumerate(given):
                 if name not in allowed:
                     text = f"found '{name}', allowed are {', '.join([*allowed][:_SHOWN])}."
                     yield (*path, index), text + nearest(name, allowed)

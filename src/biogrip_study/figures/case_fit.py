@@ -26,13 +26,13 @@ SHOWN_SEEDS = 100
 """Most seeds drawn individually; figures show the first ones."""
 
 
-def first_of_basins(found: pd.DataFrame, case: Case) -> dict[str, pd.Series]:
+def first_of_basins(identified: pd.DataFrame, case: Case) -> dict[str, pd.Series]:
     """Return the first run of each of the `basins`, by what it is called in a legend."""
-    if len(found) == 1:
-        return {"the only trace": found.iloc[0]}
+    if len(identified) == 1:
+        return {"the only trace": identified.iloc[0]}
     return {
         f"seed {runs['seed'].iloc[0]}" + f", {name}" * (name != ALL): runs.iloc[0]
-        for name, runs in basins(found, case.study.near_noise_tolerance).items()
+        for name, runs in basins(identified, case.study.near_noise_tolerance).items()
     }
 
 
@@ -40,9 +40,9 @@ def fits_of_basins(
     case: Case, identifications: Path, measurements: list[Path], calibrated: list[Path]
 ) -> dict[str, Fit]:
     """Return the fit of the first run of each basin, by label, from files of a case."""
-    found = read_identifications(identifications, case, case.study.shown_method.name)
+    identified = read_identifications(identifications, case, case.study.shown_method.name)
     fits = {}
-    for words, run in first_of_basins(found, case).items():
+    for words, run in first_of_basins(identified, case).items():
         seed = int(run["seed"])
         values = {p.name: float(run[p.column]) for p in case.sample.model.parameters}
         holding = next(path for path in measurements if seed in seeds_of(path.stem))
@@ -58,9 +58,9 @@ def _fit_of_seed(
     return fit_of(problem, parameters, made.time_s, made.readings[seed], made.sd, made.target)
 
 
-def first_seeds(found: pd.DataFrame) -> pd.DataFrame:
+def first_seeds(identified: pd.DataFrame) -> pd.DataFrame:
     """Return the identifications of seeds that are drawn individually."""
-    return found[found["seed"] < SHOWN_SEEDS]
+    return identified[identified["seed"] < SHOWN_SEEDS]
 
 
 def seeds_in_words(count: int) -> str:
@@ -99,8 +99,8 @@ def judged_fit(
     """Return the judged trace of a case and its best fit."""
     recorded = read_measurements(measurements, [TRACE])
     experiment = experiment_for(case.experiment, recorded, calibrated)
-    found = {item["quantity"]: item["value"] for item in verdicts["quantities"]}
-    return _fit_of_seed(experiment, found, recorded, TRACE)
+    values = {item["quantity"]: item["value"] for item in verdicts["quantities"]}
+    return _fit_of_seed(experiment, values, recorded, TRACE)
 
 
 def draw_force(case: Case, target: Path) -> Figure:
@@ -148,8 +148,8 @@ def draw_force(case: Case, target: Path) -> Figure:
     return drawn
 
 
-def _from_loss(found: UnilateralResponse, values: Array) -> Array:
+def _from_loss(response: UnilateralResponse, values: Array) -> Array:
     """Return values from the last sample before contact is first lost, NaN before."""
-    lost = np.flatnonzero(~found.touching)
+    lost = np.flatnonzero(~response.touching)
     start = max(lost[0] - 1, 0) if len(lost) else len(values)
     return np.where(np.arange(len(values)) >= start, values, np.nan)

@@ -36,15 +36,9 @@ from biogrip_study.records.traces import read_target
 # Ends of the axes of identified over target values, of parameters in decades and of sums.
 _WORST, _SUM = 1e3, 0.1
 _TITLE_LETTERS = 19
-_MOST_CASES = 3
 _DOTS: dict[str, Any] = {
     "linestyle": "", "marker": "o", "markersize": 2.2, "markeredgewidth": 0, "alpha": 0.55
 }  # fmt: skip
-
-
-def shown_cases(study: Study) -> list[str]:
-    """Return names of the first simulated cases, as many as fit."""
-    return study.simulated[:_MOST_CASES]
 
 
 def draw_overview(
@@ -67,14 +61,14 @@ def draw_overview(
     style.panel(axes[0], "a", cases[0].title)
     files = zip(axes[1:], cases, identifications, expected, strict=True)
     for index, (scatter, case, path, judged) in enumerate(files):
-        found = read_identifications(path, case, study.shown_method.name)
+        identified = read_identifications(path, case, study.shown_method.name)
         quantities = read_verdicts(judged)["quantities"]
-        bounded = {it["quantity"] for it in quantities if it["verdict"] != BOUNDED_ABOVE}
-        _scatter(scatter, case, first_seeds(found), bounded)
+        bounded = {item["quantity"] for item in quantities if item["verdict"] != BOUNDED_ABOVE}
+        _scatter(scatter, case, first_seeds(identified), bounded)
         scatter.set_yticks([1e-3, 1e-2, 0.1, 1, 10, 100, 1e3], [""] * 7 if index else None)
         style.panel(scatter, "bcd"[index], case.title, most_letters=_TITLE_LETTERS)
     axes[1].set_ylabel("identified / target")
-    pairs = (zip(*it.get_legend_handles_labels(), strict=True) for it in axes[1:])
+    pairs = (zip(*item.get_legend_handles_labels(), strict=True) for item in axes[1:])
     legend = {label: handle for pair in pairs for handle, label in pair}
     drawn.legend(
         legend.values(),
@@ -82,13 +76,13 @@ def draw_overview(
         loc="outside lower right",
         ncols=5,
         markerscale=2.5,
-        title=seeds_in_words(len(found)) if len(found) > SHOWN_SEEDS else None,
+        title=seeds_in_words(len(identified)) if len(identified) > SHOWN_SEEDS else None,
     )
     return drawn
 
 
-def _scatter(axes: Axes, case: Case, found: pd.DataFrame, bounded: set[str]) -> None:
-    reached = near_noise(found, tolerance := case.study.near_noise_tolerance)
+def _scatter(axes: Axes, case: Case, fits: pd.DataFrame, bounded: set[str]) -> None:
+    reached = near_noise(fits, tolerance := case.study.near_noise_tolerance)
     identified = case.published.identified
     ticks: list[str] = []
     # Sums are told so much better that on an axis of decades they are a line.
@@ -101,10 +95,10 @@ def _scatter(axes: Axes, case: Case, found: pd.DataFrame, bounded: set[str]) -> 
             continue
         x = len(ticks)
         ticks.append("+".join(parameter.symbol for parameter in group))
-        ratio = found[[parameter.column for parameter in group]].sum(axis=1).to_numpy(float)
+        ratio = fits[[parameter.column for parameter in group]].sum(axis=1).to_numpy(float)
         place = x + 0.5 * ((np.arange(len(ratio)) * 0.618034) % 1 - 0.5)
         points = np.column_stack([place, ratio / target])
-        own, ends = (
+        target_axes, ends = (
             (axes, (1 / _WORST, _WORST)) if len(group) == 1 else (sums, (1 - _SUM, 1 + _SUM))
         )
         for which, color, label in (
@@ -113,11 +107,13 @@ def _scatter(axes: Axes, case: Case, found: pd.DataFrame, bounded: set[str]) -> 
         ):
             look, labels = _DOTS | {"color": color}, (label, "")
             low, high = ((sign * np.inf, end) for sign, end in zip((-1, 1), ends, strict=True))
-            style.points_within(own, points[which], low, high, look, edge_size=3.5, labels=labels)
+            style.points_within(
+                target_axes, points[which], low, high, look, edge_size=3.5, labels=labels
+            )
         if set(names) <= set(identified):
             paper = sum(identified[name] for name in names) / target
             shown = float(np.clip(paper, *ends))
-            own.plot([x - 0.4, x + 0.4], [shown, shown], color=style.PAPER, label="paper")
+            target_axes.plot([x - 0.4, x + 0.4], [shown, shown], color=style.PAPER, label="paper")
     axes.axhline(1, color=style.TARGET, linewidth=0.8, label="truth")
     axes.set_yscale("log")
     axes.plot([], [], "^", color=style.TARGET, markersize=1.6, label="beyond the axis")
@@ -129,15 +125,16 @@ def _scatter(axes: Axes, case: Case, found: pd.DataFrame, bounded: set[str]) -> 
         axes.axvline(len(ticks) - 1.5, color=style.TARGET, linewidth=0.5)
 
 
-def draw_answer(case: Case, verdicts: Path, measurements: Path, calibrated: list[Path]) -> Figure:
-    """Draw a gripper, the judged trace of a case, and what it tells of two exchangeable dampers."""
-    found = read_verdicts(verdicts)
-    items = {item["quantity"]: item for item in found["quantities"]}
+def draw_answer(study: Study, verdicts: Path, measurements: Path, calibrated: list[Path]) -> Figure:
+    """Draw a gripper, the judged trace of the only case, and what it tells of two dampers."""
+    (case,) = study.cases.values()
+    judged = read_verdicts(verdicts)
+    items = {item["quantity"]: item for item in judged["quantities"]}
     drawn = style.figure(style.COLUMN_IN, 3.4)
     (device, trace), profiles = drawn.subplots(2, 2)
     _device(device)
     style.panel(device, "1", "two arms squeeze")
-    fit = judged_fit(case, found, measurements, calibrated)
+    fit = judged_fit(case, judged, measurements, calibrated)
     factor, unit = draw_traces(trace, {"fit": fit})
     trace.set_ylim(top=1.45 * factor * fit.measured.max())
     trace.set(xlabel="time (s)", ylabel=with_unit("rotation", unit))
@@ -147,8 +144,8 @@ def draw_answer(case: Case, verdicts: Path, measurements: Path, calibrated: list
     names = [name for name in case.sample.model.names if name in case.sample.model.exchangeable]
     for number, axes, name in zip("34", profiles, (" + ".join(names), names[1]), strict=True):
         draw_profile(axes, items[name])
-        axes.axhline(found["threshold"], color=style.BLACK, linestyle="--", linewidth=0.7)
-        place = (0.02, found["threshold"] + 0.2, f"{100 * found['confidence']:g} %")
+        axes.axhline(judged["threshold"], color=style.BLACK, linestyle="--", linewidth=0.7)
+        place = (0.02, judged["threshold"] + 0.2, f"{100 * judged['confidence']:g} %")
         axes.text(*place, transform=axes.get_yaxis_transform(), fontsize=7)
         style.panel(axes, number, f"{items[name]['symbol']}: {items[name]['verdict']}")
     profiles[0].set_ylabel("rise of χ²")
@@ -216,10 +213,10 @@ def _moduli(axes: Axes, study: Study, case: Case, identified: Path, time_s: Arra
     model = case.experiment.model
     near = []
     for method in {m.name: m for m in (study.shown_method, study.fitting_method)}.values():
-        found = first_seeds(read_identifications(identified, case, method.name))
-        fits = found[[p.column for p in model.parameters]].to_numpy(float)
+        runs = first_seeds(read_identifications(identified, case, method.name))
+        fits = runs[[p.column for p in model.parameters]].to_numpy(float)
         moduli = _modulus(model.network(fits), omega)
-        near.append(moduli[near_noise(found, study.near_noise_tolerance)])
+        near.append(moduli[near_noise(runs, study.near_noise_tolerance)])
         color = style.COLORS[method.color]
         look: dict[str, Any] = {"color": color, "linewidth": 0.4, "alpha": 0.45}
         for index, modulus in enumerate(moduli):

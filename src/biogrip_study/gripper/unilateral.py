@@ -187,9 +187,9 @@ class _System:
         self._arms = _Modes(np.diag(np.sqrt(self._k)), np.diag(np.sqrt(self._c)))
         # Springs of a sample without a parallel damper are in equilibrium but for so long.
         c_p = c_p or _AT_ONCE_S * (k_p + k.sum())
-        own = np.concatenate(([np.sqrt(k_p)], np.zeros(n)))
+        in_parallel = np.concatenate(([np.sqrt(k_p)], np.zeros(n)))
         rest = np.sqrt(k)[:, None] * np.hstack((np.ones((n, 1)), -np.eye(n)))
-        self._sample = _Modes(np.vstack((own, rest)), np.diag(np.sqrt(np.append(c_p, c))))
+        self._sample = _Modes(np.vstack((in_parallel, rest)), np.diag(np.sqrt(np.append(c_p, c))))
 
     def in_contact(self, state: Array, torques: Array) -> _Stretch:
         """Solve from a state on, in contact."""

@@ -174,14 +174,18 @@ def write_report(
         write_text(file, TEMPLATES.get_template(f"{template}.html.j2").render(shown))
 
 
-def write_summary(case: Case, verdicts: Path, figures: list[Path], page: Path) -> None:
-    """Write what the judged trace of a case tells, with figures, PNG."""
+def write_summary(
+    case: Case, verdicts: Path, judged_fit: Path, profiles: Path, summary: Path
+) -> None:
+    """Write what the judged trace of a case tells, with two figures, PNG."""
     text = TEMPLATES.get_template("summary.html.j2").render(
         case=case,
         found=read_verdicts(verdicts),
-        figures=[(path.stem, data_url("image/png", path.read_bytes())) for path in figures],
+        figures=[
+            (path.stem, data_url("image/png", path.read_bytes())) for path in (judged_fit, profiles)
+        ],
     )
-    write_text(page, text)
+    write_text(summary, text)
 
 
 def _is_own(entry: Entry, study: Study) -> bool:

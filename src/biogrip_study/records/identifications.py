@@ -64,8 +64,8 @@ READINGS = RowFile(
 def read_readings(path: Path, case: Case) -> "pd.DataFrame":
     """Read what the reading that a file is named like found; parameters stand by name."""
     seeds = range(case.seeds)
-    found = READINGS.read(path, case=[case.name], reading=[path.stem], seed=seeds)
-    return found.rename(columns={p.column: p.name for p in SINGLE_BRANCH})
+    frame = READINGS.read(path, case=[case.name], reading=[path.stem], seed=seeds)
+    return frame.rename(columns={p.column: p.name for p in SINGLE_BRANCH})
 
 
 def parameters_in_file(model: SampleModel) -> tuple[Parameter, ...]:
@@ -111,7 +111,7 @@ def history_of(method: str, seed: int, experiment: Experiment, answer: Fit) -> d
     """Return columns of a row per generation, with eight significant digits."""
     history = answer.history
     generations = len(history.best_misfit)
-    found = {
+    columns_by_name = {
         "best_misfit": history.best_misfit,
         "median_misfit": history.median_misfit,
         **_by_column(experiment, history.best_parameters.T),
@@ -123,7 +123,7 @@ def history_of(method: str, seed: int, experiment: Experiment, answer: Fit) -> d
         "evaluations": np.asarray(history.evaluations),
         **{
             name: significant(np.broadcast_to(values, generations), _DIGITS)
-            for name, values in found.items()
+            for name, values in columns_by_name.items()
         },
     }
 
@@ -164,37 +164,39 @@ _FEWEST = 0.1
 """Least share of runs that makes a basin."""
 
 
-def basins(found: "pd.DataFrame", tolerance: float) -> "dict[str, pd.DataFrame]":
+def basins(identified: "pd.DataFrame", tolerance: float) -> "dict[str, pd.DataFrame]":
     """Divide the runs of a method on a case into those that end `near_noise` and those above it.
 
     These are two basins, by their names, if a tenth of the runs or more end in each. Else there is
     one, `ALL`, as where the noise is unknown.
     """
-    near = near_noise(found, tolerance)
+    near = near_noise(identified, tolerance)
     if not _FEWEST <= near.mean() <= 1 - _FEWEST:
-        return {ALL: found}
-    return {"near the noise": found[near], "above the noise": found[~near]}
+        return {ALL: identified}
+    return {"near the noise": identified[near], "above the noise": identified[~near]}
 
 
-def chi_square_increase(found: "pd.DataFrame", case: Case, of: str = "misfit") -> Array:
+def chi_square_increase(identified: "pd.DataFrame", case: Case, of: str = "misfit") -> Array:
     """Return the increase of each identification's chi^2 over the lowest of its trace, (n,).
 
     Identifications by all methods are given, and the column of misfits. The lowest is that of any
     method, or that of the true parameters where these are known; the best fit of a few parameters
     lies below the latter.
     """
-    misfit = found["misfit"]
-    lowest = misfit.groupby(found["seed"]).transform("min")
-    lowest = np.fmin(lowest, found["noise_rms"].where(found["noise_rms"] > 0))
-    return len(case.times_s) * ((found[of] / lowest) ** 2 - 1).to_numpy(float)
+    misfit = identified["misfit"]
+    lowest = misfit.groupby(identified["seed"]).transform("min")
+    lowest = np.fmin(lowest, identified["noise_rms"].where(identified["noise_rms"] > 0))
+    return len(case.times_s) * ((identified[of] / lowest) ** 2 - 1).to_numpy(float)
 
 
-def reached_encodable(found: "pd.DataFrame", case: Case) -> BoolArray:
+def reached_encodable(identified: "pd.DataFrame", case: Case) -> BoolArray:
     """Return True for each run with chi^2 at most a tolerance above the best encodable point, (n,).
 
     Every method can reach this point or lie below it, with digits or without.
     """
-    misfit, encodable = (found[name].to_numpy(float) for name in ("misfit", "encodable_misfit"))
+    misfit, encodable = (
+        identified[name].to_numpy(float) for name in ("misfit", "encodable_misfit")
+    )
     above = len(case.times_s) * (misfit**2 - encodable**2)
     return above <= case.study.optimum_tolerance * encodable**2
 
@@ -213,18 +215,18 @@ def share_with_limits(count: int, runs: int) -> tuple[float, float, float]:
 
 def share_in_words(count: int, runs: int) -> str:
     """Return a share of runs in percent with its 95 % interval: ``18 % (10–31)``."""
-    share, low, high = (100 * each for each in share_with_limits(count, runs))
+    share, low, high = (100 * limit for limit in share_with_limits(count, runs))
     return f"{share:.0f} % ({low:.0f}–{high:.0f})"
 
 
-def near_noise(found: "pd.DataFrame", tolerance: float) -> BoolArray:
+def near_noise(identified: "pd.DataFrame", tolerance: float) -> BoolArray:
     """Return True for each seed whose misfit is at most a share above the RMS noise, (n_seeds,).
 
     Such a fit looks right in a plot. With thousands of readings it need not be an optimum:
     a misfit 2 % above the noise increases chi^2 of 4001 readings by 162; see
     `chi_square_increase`.
     """
-    misfit, noise = (found[name].to_numpy(float) for name in ("misfit", "noise_rms"))
+    misfit, noise = (identified[name].to_numpy(float) for name in ("misfit", "noise_rms"))
     return misfit <= (1 + tolerance) * noise
 
 

@@ -112,18 +112,18 @@ def write_measurements(path: Path, measurements: Measurements) -> None:
 
 def read_measurements(path: Path, seeds: list[int] | None = None) -> Measurements:
     """Read noisy traces of all or of given seeds, which it must have."""
-    found = read_arrays(path)
-    traces = dict(zip(found["seeds"].tolist(), found["traces"], strict=True))
+    arrays = read_arrays(path)
+    traces = dict(zip(arrays["seeds"].tolist(), arrays["traces"], strict=True))
     if missing := set(seeds or ()) - set(traces):
         raise BiogripError(f"{path}: has no trace of seed {min(missing)}.")
     chosen = traces if seeds is None else {seed: traces[seed] for seed in seeds}
-    onset_s = found.get("onset_s")
+    onset_s = arrays.get("onset_s")
     return Measurements(
-        found["time_s"],
-        found.get("target"),
+        arrays["time_s"],
+        arrays.get("target"),
         chosen,
-        sd=found.get("sd"),
-        sd_known="sd_known" not in found,
+        sd=arrays.get("sd"),
+        sd_known="sd_known" not in arrays,
         onset_s=None if onset_s is None else float(onset_s),
-        remarks=tuple(map(str, found.get("remarks", ()))),
+        remarks=tuple(map(str, arrays.get("remarks", ()))),
     )

@@ -125,8 +125,8 @@ def fit(
             whose = case.study.config.study_seed, case.name
             rngs[name] = [stream(*whose, seed, f"model {name}") for seed in group]
         done = partial(progress.done, len(group))
-        found = fit_models(posed, case.block.least_squares, rngs, done)
-        for name, answers in found.items():
+        fits_by_model = fit_models(posed, case.block.least_squares, rngs, done)
+        for name, answers in fits_by_model.items():
             sizes = len(models[name].names), len(recorded.time_s)
             rows[name] += [
                 (case.name, name, seed, *sizes, f"{answer.misfit:.8e}")

@@ -12,6 +12,7 @@ import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stderr
 from dataclasses import MISSING, Field, fields
+from importlib import import_module
 from inspect import signature
 from pathlib import Path
 from typing import Any, ClassVar, get_type_hints
@@ -80,7 +81,9 @@ def settings(study: Study, keys: Iterable[str], case: str = "") -> dict[str, Any
         # What the case leaves at its default is not the study's: it has all of its blocks.
         blocks = {key: value for key, value in blocks.items() if key not in CASE_KEYS}
         blocks |= study.case(case).plain | {"seeds": study.case(case).seeds}
-    blocks = blocks | {"cases": {name: it.plain for name, it in study.cases.items()}}
+    blocks = blocks | {
+        "cases": {name: case_of_study.plain for name, case_of_study in study.cases.items()}
+    }
 
     def value_of(block: Mapping[str, Any] | None, key: str) -> Any:
         name, _, inner = key.partition(".")
@@ -108,7 +111,7 @@ def study_of(given: Mapping[str, Any]) -> Study:
         if key.startswith("cases."):
             _, name, inner = key.split(".", 2)
             cases.setdefault(name, {})[inner] = value
-    blocks = {name: _named(_NamedOfCase, own) for name, own in cases.items()}
+    blocks = {name: _named(_NamedOfCase, keys) for name, keys in cases.items()}
     return Study(_named(_NamedOfStudy, given, cases=blocks))
 
 
@@ -167,13 +170,20 @@ def job_settings(job: Any) -> dict[str, Any]:
     return given
 
 
+def called(stage: str, job: Any) -> Any:
+    """Call the function of a full name with what it takes of a job, see `arguments`."""
+    module, _, name = stage.rpartition(".")
+    function = getattr(import_module(module), name)
+    return function(**arguments(job, function))
+
+
 def arguments(job: Any, function: Callable[..., object]) -> dict[str, Any]:
     """Return what a function takes: params, wildcards and files of a job's rule, by their names.
 
     ``case`` is the case, ``study`` the study, and ``seeds`` are those of the batch.
     """
     of_job = job.params, job.wildcards, job.input, job.output
-    given: dict[str, Any] = {name: it for of in of_job for name, it in of.items()}
+    given: dict[str, Any] = {name: value for of in of_job for name, value in of.items()}
     given["seeds"] = [*seeds_of(given.get("batch", "seeds_0-0"))]
     for name, kind in get_type_hints(function).items():
         if kind is Case:

@@ -64,13 +64,13 @@ def expect(case: Case, target: Path, calibrated: list[Path], expected: Path) -> 
     noise_sd = rms(standard_deviation(rotation, case.noise)) or None
     problem = experiment.of(time_s, rotation, noise_sd=noise_sd)
     truth = experiment.logs(case.parameters)
-    found = identify_from(problem, truth)
+    best_fit = identify_from(problem, truth)
     misfit = float(problem.residuals.misfit(np.exp(truth)[None])[0])
-    gain = len(time_s) * (misfit**2 - found.misfit**2) / (noise_sd or found.misfit) ** 2
+    gain = len(time_s) * (misfit**2 - best_fit.misfit**2) / (noise_sd or best_fit.misfit) ** 2
     if gain < _ROUNDING:
         # Along what nothing tells, digits of the target would choose, and those of a processor.
-        found = replace(found, parameters=np.exp(truth), misfit=misfit, converged=True)
-    diagnosis = diagnose(problem, found, confidence=case.confidence)
+        best_fit = replace(best_fit, parameters=np.exp(truth), misfit=misfit, converged=True)
+    diagnosis = diagnose(problem, best_fit, confidence=case.confidence)
     _write(expected, case, diagnosis, {})
 
 
@@ -106,8 +106,8 @@ def estimate(
     """
     experiment = with_calibration(case.judged_experiment, calibrated)
     time_s, _, rotation = read_target(target, case.times_s)
-    found = read_verdicts(expected)["quantities"]
-    determined = {item["quantity"] for item in found if item["verdict"] == DETERMINED}
+    foreseen = read_verdicts(expected)["quantities"]
+    determined = {item["quantity"] for item in foreseen if item["verdict"] == DETERMINED}
     every = parameters_and_sum(experiment.searched)
     selected = [quantity for quantity in every if quantity.label in determined]
     rest_known, informed, truth = _rest_known(case, experiment, time_s, rotation)
@@ -165,8 +165,8 @@ def judge_quantities(
         every = compute_findings(likelihoods, quantities, smooth=False)
         return [profiled(*pair, []) for pair in zip(likelihoods, every, strict=True)]
 
-    problems, found = [fit.problem for fit in fits], [fit.found for fit in fits]
-    judged = settled(problems, found, profile, confidence=confidence)
+    problems, best_fits = [fit.problem for fit in fits], [fit.found for fit in fits]
+    judged = settled(problems, best_fits, profile, confidence=confidence)
     return [diagnosis for diagnosis, _ in judged]
 
 

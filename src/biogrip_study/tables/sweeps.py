@@ -23,7 +23,7 @@ from biogrip_study.methods.genome import nearest_encodable
 from biogrip_study.methods.registry import METHODS
 from biogrip_study.records.identifications import near_noise, near_noise_words, read_batch
 from biogrip_study.records.rows import RowFile
-from biogrip_study.tables.layout import Column, Row, ShownTable, write
+from biogrip_study.tables.layout import Column, Row, ShownTable
 
 POINTS = RowFile(
     "a sweep",
