@@ -5,7 +5,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.optimize import least_squares
 
+from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.models import Sample
@@ -16,6 +18,7 @@ from biogrip_study.stages.identification import experiment_for
 from biogrip_study.stages.judgement import expect
 from tests.helpers.default import STUDY, seen, study_of
 from tests.helpers.places import EXAMPLE
+from tests.helpers.problems import MODEL, rotation
 
 
 def drop(torque_Nm: float, *more: Phase, unilateral: bool = False) -> Any:
@@ -76,3 +79,27 @@ def test_without_noise_the_fit_is_the_truth_and_not_the_rounding_of_digits(tmp_p
     # The damper that is not there has the lower end of its search range.
     assert values == {"k": 35.0, "k_p": 12.3, "c": 299.9, "c_p": 0.001, "c + c_p": 299.9}
     assert found["fit"] == "ok"
+
+
+def test_what_to_expect_of_a_nonlinear_target_is_the_fit_and_not_the_truth(tmp_path: Path) -> None:
+    """By SciPy's fit of the linear model, k_p being at the lower end of its range."""
+    case = study_of("models: {target: nonlinear}\nmeasurement: {rate_Hz: 0.5}").cases[
+        "liquid_drop_2"
+    ]
+    files = tmp_path / "target.csv", tmp_path / "expected.json"
+    target.simulate(case, files[0])
+    expect(case, files[0], [], files[1])
+    time_s, _, read = read_target(files[0], case.times_s)
+
+    def left(logs: Array) -> Array:
+        k, c, c_p = np.exp(logs)
+        return 1e4 * (rotation(MODEL, [k, 1.1e-4, c, c_p], time_s, inertia=False) - read)
+
+    ends = dict.fromkeys(("ftol", "xtol", "gtol"), 1e-12)
+    k, c, c_p = np.exp(least_squares(left, np.log([1.0, 10.0, 0.1]), **ends).x)
+    judged = json.loads(files[1].read_text())["quantities"]
+    values = {item["quantity"]: item["value"] for item in judged}
+    # Of k the trace says less: the fits end where chi^2 is the same to a thousandth.
+    assert values["c + c_p"] == pytest.approx(c + c_p, rel=1e-4)
+    assert values["k"] == pytest.approx(k, abs=0.005)
+    assert max(values["c + c_p"], values["k"] * 10) < 9.995
