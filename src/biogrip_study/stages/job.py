@@ -47,26 +47,11 @@ class _Named:
         return super().__getattribute__(name)
 
 
-class _NamedOfStudy(_Named, StudyConfig):
-    pass
-
-
-class _NamedOfCase(_Named, CaseBlock):
-    pass
-
-
-class _NamedOfMeasurement(_Named, MeasurementBlock):
-    pass
-
-
-class _NamedOfIdentifiability(_Named, Identifiability):
-    pass
-
-
 # Blocks of which a rule may name single keys.
-_SPLIT: dict[str, type[_Named]] = {
-    "measurement": _NamedOfMeasurement,
-    "identifiability": _NamedOfIdentifiability,
+_SPLIT = {"measurement": MeasurementBlock, "identifiability": Identifiability}
+_NAMED = {
+    kind: type(f"_NamedOf{kind.__name__}", (_Named, kind), {})
+    for kind in (StudyConfig, CaseBlock, *_SPLIT.values())
 }
 
 
@@ -100,8 +85,8 @@ def keys_of_cases(study: Study, *keys: str) -> list[str]:
 
 def case_of(name: str, given: Mapping[str, Any]) -> Case:
     """Return a case of which some keys are given, by `settings`."""
-    study = Study(_named(_NamedOfStudy, given))
-    return Case(name, _named(_NamedOfCase, given), study.config, study=study)
+    study = Study(_named(StudyConfig, given))
+    return Case(name, _named(CaseBlock, given), study.config, study=study)
 
 
 def study_of(given: Mapping[str, Any]) -> Study:
@@ -111,8 +96,8 @@ def study_of(given: Mapping[str, Any]) -> Study:
         if key.startswith("cases."):
             _, name, inner = key.split(".", 2)
             cases.setdefault(name, {})[inner] = value
-    blocks = {name: _named(_NamedOfCase, keys) for name, keys in cases.items()}
-    return Study(_named(_NamedOfStudy, given, cases=blocks))
+    blocks = {name: _named(CaseBlock, keys) for name, keys in cases.items()}
+    return Study(_named(StudyConfig, given, cases=blocks))
 
 
 def _named(kind: Any, given: Mapping[str, Any], **keys: Any) -> Any:
@@ -128,7 +113,7 @@ def _named(kind: Any, given: Mapping[str, Any], **keys: Any) -> Any:
         elif field.name in given:
             made = field.default_factory
             keys[field.name] = field.default if made is MISSING else made()
-    return kind(keys)
+    return _NAMED[kind](keys)
 
 
 def batch_names(seeds: int, size: int) -> list[str]:
