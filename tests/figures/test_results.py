@@ -7,7 +7,7 @@ import pytest
 from matplotlib.patches import Rectangle
 
 from biogrip.figures import style
-from biogrip.figures.fit import Fit, draw_fit, scale_of
+from biogrip.figures.fit import FittedTrace, draw_fit, scale_of
 from biogrip.figures.likelihood import draw_profile
 from biogrip.figures.style import figure, save, styled
 from biogrip.physics.instruments import MODULUS
@@ -73,7 +73,7 @@ def test_axes_suit_the_sampling_and_residuals_are_in_the_unit_that_was_minimised
         (dense, np.full(200, 0.5), "linear", " / sd"),
     ):
         modulus = 100 / (1 + time_s)
-        fit = Fit(time_s, None, 1.01 * modulus, modulus, sd, MODULUS)
+        fit = FittedTrace(time_s, None, 1.01 * modulus, modulus, sd, MODULUS)
         traces, residuals = draw_fit({"fit": fit}, "").axes
         assert (traces.get_xscale(), traces.get_yscale()) == (scale, scale)
         assert traces.get_ylabel() == "modulus (Pa)"
@@ -103,7 +103,7 @@ def test_no_more_seeds_are_drawn_than_can_be_seen(tmp_path: Path) -> None:
 def scattered(overlay: str, identifications: Path) -> Any:
     """Of a case of which the sum alone is determined."""
     folder, case = identifications.parent, study_of(f"{FEW}{overlay}").cases[CASE]
-    targets.simulate(case, folder / "target.csv")
+    targets.simulate_target(case, folder / "target.csv")
     verdicts = dict.fromkeys(["k", "k_p", "c", "c_p"], "not determined")
     verdicts["c + c_p"] = "determined"
     items = [{"quantity": name, "verdict": verdict} for name, verdict in verdicts.items()]

@@ -15,9 +15,13 @@ from biogrip.physics.gripper import torque
 from biogrip.physics.models import MODELS, Sample
 from biogrip_study.config.published import Published
 from biogrip_study.config.study import Study
-from biogrip_study.records.identifications import READINGS, columns, read_identifications
-from biogrip_study.stages.identification import identify
-from biogrip_study.stages.targets import measure, simulate
+from biogrip_study.records.identifications import (
+    READING_FILE,
+    identification_columns,
+    read_identifications,
+)
+from biogrip_study.stages.identification import identify_batch
+from biogrip_study.stages.targets import measure, simulate_target
 from biogrip_study.tables.layout import Column, ShownTable, write
 from tests.helpers.default import STUDY, seen, study_of
 from tests.helpers.places import ROOT
@@ -163,7 +167,7 @@ def files(tmp_path: Path) -> list[Path]:
         path = tmp_path / name / "least_squares" / "seeds_0-3.csv"
         path.parent.mkdir(parents=True)
         rows = [[name, "least_squares", s, k, 1e-4, 10, 1e-4, *5 * [1]] for s, k in enumerate(K)]
-        found = pd.DataFrame(rows, columns=columns(MODELS["generalized_maxwell"]))
+        found = pd.DataFrame(rows, columns=identification_columns(MODELS["generalized_maxwell"]))
         found.to_csv(path, index=False)
         made.append(path)
     return made
@@ -239,7 +243,7 @@ FAR = (0.1, 5.6e-5, 1.0, 9.0, 1.5, 1.0, 40, 20)
 def given(tmp_path: Path) -> tuple[Study, Any]:
     rows = [(CASE, "printed", n, *run) for n, run in enumerate((HIT, AWAY, AWAY, HIT))]
     rows += [(CASE, "other", n, *run) for n, run in enumerate((HIT, FAR, FAR, FAR))]
-    READINGS.write(tmp_path / f"{CASE}.csv", rows)
+    READING_FILE.write(tmp_path / f"{CASE}.csv", rows)
     study = study_of(FEW)
     return study, readings.read(study, [tmp_path / f"{CASE}.csv"])
 
@@ -292,13 +296,13 @@ def test_one_that_changes_nothing_finds_what_the_study_finds(tmp_path: Path) -> 
     target, measured, ours_file = (tmp_path / name for name in ("t.csv", "m.npz", "ours.csv"))
     study = study_of(OVERLAY)
     case = study.case(CASE)
-    simulate(case, target)
+    simulate_target(case, target)
     measure(case, range(3), target, measured)
-    identify(case, "genetic", range(3), measured, [], ours_file, tmp_path / "h.npz")
+    identify_batch(case, "genetic", range(3), measured, [], ours_file, tmp_path / "h.npz")
     interpreted = tmp_path / f"{CASE}.csv"
     identify_readings(case, target, interpreted)
     ours = read_identifications(ours_file, case)
-    rows = READINGS.read(interpreted)
+    rows = READING_FILE.read(interpreted)
     same = rows[rows["reading"] == "printed"].reset_index(drop=True)
     for column in ("k_N_per_m", "k_p_N_per_m", "c_Ns_per_m", "c_p_Ns_per_m", "misfit", "noise_rms"):
         np.testing.assert_array_equal(same[column], ours[column])

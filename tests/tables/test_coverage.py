@@ -28,7 +28,7 @@ cases: {endothelial_cell: null, liquid_drop_1: null}
 
 @pytest.fixture
 def target(tmp_path: Path) -> Path:
-    targets.simulate(study_of(OVERLAY).cases[CASE], tmp_path / "target.csv")
+    targets.simulate_target(study_of(OVERLAY).cases[CASE], tmp_path / "target.csv")
     return tmp_path / "target.csv"
 
 
@@ -123,7 +123,7 @@ def test_the_bound_of_a_case_is_that_of_its_calibration(tmp_path: Path) -> None:
         (tmp_path / f"{name}.yaml").write_text(calibration_yaml(calibrated, calibrated))
         rows = [(name, "k", seed, 35.1, 34, 36, 35.2, "", "", "") for seed in (1, 2)]
         INTERVALS.write(tmp_path / name / "seeds_1-2.csv", rows)
-        targets.simulate(case, tmp_path / f"{name}.csv")
+        targets.simulate_target(case, tmp_path / f"{name}.csv")
         thought = step_response(replace(study.gripper, left=arm, right=arm), network)
         above, below = np.split(superpose(thought, TORQUE, case.times_s), 2)
         slopes = (above - below) / 2e-5
@@ -133,8 +133,10 @@ def test_the_bound_of_a_case_is_that_of_its_calibration(tmp_path: Path) -> None:
         [tmp_path / file.format(name) for name in study.cases]
         for file in ("{}.csv", "{}.yaml", "{}/seeds_1-2.csv")
     )
-    rows = coverage(study, made, batches, calibrations).rows
-    assert {row["case"]: row["bound_percent"] for row in rows} == pytest.approx(bounds, rel=1e-4)
+    table = coverage(study, made, batches, calibrations)
+    assert {row["case"]: row["bound_percent"] for row in table.rows} == pytest.approx(
+        bounds, rel=1e-4
+    )
     assert bounds["twin"] > 1.1 * bounds["endothelial_cell"]
 
 
@@ -142,7 +144,7 @@ def test_some_seeds_are_judged_in_full(tmp_path: Path, target: Path) -> None:
     expected = tmp_path / "expected.json"
     write_object(expected, {"quantities": [{"quantity": "k", "verdict": "determined"}]})
     case = study_of(OVERLAY.replace("0.9}", "0.9, verdicts_every: 3}")).case(CASE)
-    stage.estimate(case, range(2, 5), target, expected, [], tmp_path / "i.csv")
+    stage.estimate_intervals(case, range(2, 5), target, expected, [], tmp_path / "i.csv")
     found = INTERVALS.read(tmp_path / "i.csv")
     assert set(found["seed"]) == {2, 3, 4}
     whole = found[found["verdict"].notna()]

@@ -19,9 +19,9 @@ from biogrip.terminal import Progress
 from biogrip_study.config.case_blocks import CaseBlock
 from biogrip_study.config.study import Case
 from biogrip_study.methods.genetic import identify_many
-from biogrip_study.records.identifications import READINGS
+from biogrip_study.records.identifications import READING_FILE
 from biogrip_study.records.traces import read_target
-from biogrip_study.stages.identification import groups
+from biogrip_study.stages.identification import seed_groups
 from biogrip_study.stages.job import arguments, logged
 from biogrip_study.stages.targets import response
 
@@ -40,12 +40,12 @@ def identify_reading(case: Case, reading: str, target: Path, rows: Path) -> None
     time_s, _, clean = read_target(target, case.times_s)
     if (read.gripper, len(read.times_s)) != (case.gripper, len(time_s)):
         time_s, (clean, _) = read.times_s, response(read, read.times_s)
-    READINGS.write(rows, _rows(read, reading, time_s, clean))
+    READING_FILE.write(rows, _rows(read, reading, time_s, clean))
 
 
 def _rows(case: Case, name: str, time_s: Array, clean: Array) -> Iterator[tuple[str | int, ...]]:
     progress, experiment = Progress(f"{case.name}, {name}", case.seeds), case.experiment
-    for seeds in groups(range(case.seeds)):
+    for seeds in seed_groups(range(case.seeds)):
         rngs = [experiment.stream("noise", seed) for seed in seeds]
         traces = [add_noise(clean, case.noise, rng, time_s) for rng in rngs]
         answers = _best(case, name, seeds, experiment.of_each(time_s, traces))

@@ -31,7 +31,7 @@ rule sweep:
             *keys_of_cases(STUDY, *CASE_KEYS),
         ),
         stages=[
-            "biogrip_study.tables.sweeps.judge",
+            "biogrip_study.tables.sweeps.judge_points",
             "biogrip_study.tables.sweeps.robustness",
         ],
     message:

@@ -19,7 +19,7 @@ from biogrip.judging.levels import CERTAIN
 from biogrip.judging.quantities import quantity_value
 
 # End of the axis of profiles, and ratio of the ends above which that of values is logarithmic.
-_HIGHEST_INCREASE, _WIDE = 12.0, 5.0
+_HIGHEST_INCREASE, _LOGARITHMIC_FROM = 12.0, 5.0
 
 
 def draw_profiles_of(
@@ -55,9 +55,9 @@ def draw_profiles_of(
 def draw_profile(axes: Axes, item: Mapping[str, Any]) -> None:
     """Draw the profile of a quantity's verdict, with its limits."""
     axes.plot(*_curve(item["profile"]), color=style.FITTED, label="this trace")
-    _limits(axes, item)
+    _shade_within_limits(axes, item)
     low, high = _profile_limits(item)
-    if high / low > _WIDE:
+    if high / low > _LOGARITHMIC_FROM:
         axes.set_xscale("log")
         axes.set_xticks(*_decade_ticks(low, high))
         axes.minorticks_off()
@@ -104,7 +104,7 @@ def _decade_ticks(low: float, high: float) -> tuple[list[float], list[str]]:
     return inside, [f"{value:g}" for value in inside]
 
 
-def _limits(axes: Axes, item: Mapping[str, Any]) -> None:
+def _shade_within_limits(axes: Axes, item: Mapping[str, Any]) -> None:
     low, high = item["low"], item["high"]
     values = item["profile"]["values"]
     if low is not None or high is not None:

@@ -27,7 +27,7 @@ from biogrip_study.methods.registry import METHODS
 
 CALIBRATED = "calibrated"
 
-_MOST_SAMPLES = 10_000_000
+_MOST_SAMPLES_OF_TRACE = 10_000_000
 
 _AnyGripper = Annotated[
     Annotated[dict[str, Any], Tag("a block of keys")] | Annotated[str, Tag("text")], BY_KIND
@@ -182,7 +182,7 @@ class CaseBlock(Shared, SampleBlocks):
         measured = self.measurement
         samples = self.protocol.end_s * measured.rate_Hz + 1
         needed = len(self.searched) + sum(measured.along.values()) + 1
-        most = MOST_SAMPLES if measured.coloured else _MOST_SAMPLES
+        most = MOST_SAMPLES if measured.coloured else _MOST_SAMPLES_OF_TRACE
         if not needed <= samples <= most:
             said = f"found {measured.rate_Hz:g}, which gives {counted(f'{samples:.6g}', 'sample')}"
             how = " with a coloured noise model" if measured.coloured else ""

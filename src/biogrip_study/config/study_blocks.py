@@ -56,7 +56,7 @@ class ValueBlock(BaseModel):
 
 
 _Keys = Distinct[Annotated[tuple[str, ...], Field(min_length=1, max_length=100)]]
-_Value = Annotated[_Number | _Text | Annotated[ValueBlock, Tag("a block of keys")], BY_KIND]
+_AxisValue = Annotated[_Number | _Text | Annotated[ValueBlock, Tag("a block of keys")], BY_KIND]
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class AxisBlock(Block):
     key: Annotated[Annotated[str, Tag("text")] | Annotated[_Keys, Tag("a list")], BY_KIND]
     """Dotted key, or list of keys that change together, in any block that a case may change, e.g.
     `measurement.noise.level`."""
-    values: Distinct[Annotated[tuple[_Value, ...], Field(min_length=1, max_length=16)]]
+    values: Distinct[Annotated[tuple[_AxisValue, ...], Field(min_length=1, max_length=16)]]
     """Values of the key; or blocks to merge into the block of the key, each with a `label` of its
     own."""
     unit: Printed | None = None
@@ -204,7 +204,7 @@ def _word(value: float | str) -> str:
 
 
 _MOST_CASES = 2000
-_Name = Annotated[
+_SweepName = Annotated[
     str,
     Field(
         pattern="^[A-Za-z][A-Za-z0-9_]{0,31}$",
@@ -291,14 +291,14 @@ class StudyConfig(CommonBlocks, Shared):
     """Names of the cases to run; the others are left out. By default all under `cases`."""
     design: DesignBlock = field(default_factory=DesignBlock)
     sweeps: Annotated[
-        Mapping[_Name, SweepBlock],
+        Mapping[_SweepName, SweepBlock],
         Field(
-            description=f"Grids of cases, by name, of at most {MOST_POINTS} points together. Every point "
-            "is a case that differs in two values; it is identified like others, and shown in the "
-            "sweep's table only."
+            description=f"Grids of cases, by name, of at most {MOST_POINTS} points together. Every "
+            "point is a case that differs in two values; it is identified like others, and shown "
+            "in the sweep's table only."
         ),
     ] = field(default_factory=dict)
-    readings: Annotated[Mapping[_Name, ReadingBlock], Field(max_length=100)] = field(
+    readings: Annotated[Mapping[_SweepName, ReadingBlock], Field(max_length=100)] = field(
         default_factory=dict
     )
     """Interpretations of the paper's text, by name, each tried with the genetic algorithm on the

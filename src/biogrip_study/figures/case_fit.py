@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from biogrip.arrays import Array
 from biogrip.figures import style
-from biogrip.figures.fit import Fit, draw_fit, fit_of, scale_of
+from biogrip.figures.fit import FittedTrace, draw_fit, fit_of, scale_of
 from biogrip.figures.likelihood import draw_profiles_of
 from biogrip.fit.experiment import Experiment
 from biogrip_study.config.study import Case
@@ -20,7 +20,7 @@ from biogrip_study.records.identifications import ALL, basins, read_identificati
 from biogrip_study.records.rows import seeds_of
 from biogrip_study.records.traces import Measurements, read_measurements, read_target
 from biogrip_study.stages.identification import experiment_for
-from biogrip_study.stages.judgement import TRACE
+from biogrip_study.stages.judgement import JUDGED_SEED
 
 SHOWN_SEEDS = 100
 """Most seeds drawn individually; figures show the first ones."""
@@ -38,7 +38,7 @@ def first_of_basins(identified: pd.DataFrame, case: Case) -> dict[str, pd.Series
 
 def fits_of_basins(
     case: Case, identifications: Path, measurements: list[Path], calibrated: list[Path]
-) -> dict[str, Fit]:
+) -> dict[str, FittedTrace]:
     """Return the fit of the first run of each basin, by label, from files of a case."""
     identified = read_identifications(identifications, case, case.study.shown_method.name)
     fits = {}
@@ -54,7 +54,7 @@ def fits_of_basins(
 
 def _fit_of_seed(
     problem: Experiment, parameters: Mapping[str, float], made: Measurements, seed: int
-) -> Fit:
+) -> FittedTrace:
     return fit_of(problem, parameters, made.time_s, made.readings[seed], made.sd, made.target)
 
 
@@ -83,7 +83,7 @@ def draw_judged_fit(
 ) -> Figure:
     """Draw the judged trace of a case and its best fit."""
     fit = judged_fit(case, read_verdicts(verdicts), measurements[0], calibrated)
-    trace = "recorded trace" if case.recorded else f"seed {TRACE}"
+    trace = "recorded trace" if case.recorded else f"seed {JUDGED_SEED}"
     return draw_fit({f"best fit ({trace})": fit}, case.title, case.published.axis_rad)
 
 
@@ -95,12 +95,12 @@ def draw_profiles(case: Case, verdicts: Path, expected: list[Path]) -> Figure:
 
 def judged_fit(
     case: Case, verdicts: Mapping[str, Any], measurements: Path, calibrated: list[Path]
-) -> Fit:
+) -> FittedTrace:
     """Return the judged trace of a case and its best fit."""
-    recorded = read_measurements(measurements, [TRACE])
+    recorded = read_measurements(measurements, [JUDGED_SEED])
     experiment = experiment_for(case.experiment, recorded, calibrated)
     values = {item["quantity"]: item["value"] for item in verdicts["quantities"]}
-    return _fit_of_seed(experiment, values, recorded, TRACE)
+    return _fit_of_seed(experiment, values, recorded, JUDGED_SEED)
 
 
 def draw_force(case: Case, target: Path) -> Figure:

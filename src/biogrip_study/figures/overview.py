@@ -64,7 +64,7 @@ def draw_overview(
         identified = read_identifications(path, case, study.shown_method.name)
         quantities = read_verdicts(judged)["quantities"]
         bounded = {item["quantity"] for item in quantities if item["verdict"] != BOUNDED_ABOVE}
-        _scatter(scatter, case, first_seeds(identified), bounded)
+        _draw_ratios(scatter, case, first_seeds(identified), bounded)
         scatter.set_yticks([1e-3, 1e-2, 0.1, 1, 10, 100, 1e3], [""] * 7 if index else None)
         style.panel(scatter, "bcd"[index], case.title, most_letters=_TITLE_LETTERS)
     axes[1].set_ylabel("identified / target")
@@ -81,7 +81,7 @@ def draw_overview(
     return drawn
 
 
-def _scatter(axes: Axes, case: Case, fits: pd.DataFrame, bounded: set[str]) -> None:
+def _draw_ratios(axes: Axes, case: Case, fits: pd.DataFrame, bounded: set[str]) -> None:
     reached = near_noise(fits, tolerance := case.study.near_noise_tolerance)
     identified = case.published.identified
     ticks: list[str] = []
@@ -167,7 +167,7 @@ def _device(axes: Axes) -> None:
 NEAR = 0.1
 """Relative spread of nine tenths of the fits below which the experiment determines a modulus."""
 
-_POINTS = 121
+_FREQUENCIES = 121
 _PANEL_LETTERS = 28
 _STYLES: tuple[dict[str, Any], ...] = (
     *({"color": colour} for colour in (style.BLUE, style.ORANGE, style.GREEN)),
@@ -190,7 +190,7 @@ def draw_moduli(study: Study, identifications: list[Path], targets: list[Path]) 
         sigma = standard_deviation(rotation, case.noise)
         # Without noise there is nothing to compare with: NaN.
         relative = sensitivity / np.where(sigma > 0, sigma, np.nan)
-        _moduli(axes[0, column], study, case, identified, time_s)
+        _draw_moduli_of_case(axes[0, column], study, case, identified, time_s)
         _sensitivities(axes[1, column], case.experiment.searched, time_s, relative)
         style.panel(axes[0, column], "abc"[column], case.title, _PANEL_LETTERS)
         style.panel(axes[1, column], "def"[column], "when each parameter shows", _PANEL_LETTERS)
@@ -205,11 +205,13 @@ def draw_moduli(study: Study, identifications: list[Path], targets: list[Path]) 
     return drawn
 
 
-def _moduli(axes: Axes, study: Study, case: Case, identified: Path, time_s: Array) -> None:
+def _draw_moduli_of_case(
+    axes: Axes, study: Study, case: Case, identified: Path, time_s: Array
+) -> None:
     """Draw G' and G'' of all fits and of the truth, and shade where the fits agree."""
     between = np.diff(time_s)
     slowest, fastest = 1 / (time_s[-1] - time_s[0]), 1 / float(np.min(between))
-    omega = np.geomspace(slowest / 30, 30 * fastest, _POINTS)
+    omega = np.geomspace(slowest / 30, 30 * fastest, _FREQUENCIES)
     model = case.experiment.model
     near = []
     for method in {m.name: m for m in (study.shown_method, study.fitting_method)}.values():

@@ -25,7 +25,7 @@ from biogrip_study.config.study import Case, Study
 from biogrip_study.page import answers
 from biogrip_study.records.identifications import read_verdicts
 from biogrip_study.records.traces import read_measurements
-from biogrip_study.stages.judgement import TRACE
+from biogrip_study.stages.judgement import JUDGED_SEED
 
 # Characters left for images in a report of at most 8 MB.
 _MOST_PICTURE_LETTERS = 2_800_000
@@ -51,15 +51,15 @@ _FIRST_FIT = 9
 # Parameters that have a slider.
 _SLID = "k", "k_p", "c", "c_p"
 # As many readings as a curve of a few hundred pixels shows.
-_MOST_READINGS = 800
+_READINGS_ON_SCREEN = 800
 # More digits than a screen shows, and fewer than those in which processors differ.
-_DIGITS = 6
+_SCREEN_DIGITS = 6
 # How far a slider goes below the least and above the largest parameter.
-_BEYOND = 10.0
+_SLIDER_BEYOND = 10.0
 
 TEMPLATES = environment(Path(__file__).parent)
 TEMPLATES.globals |= {"target_of": quantity_value}
-_NUMBER = re.compile(r"(?:&[gl]t;|[≤≥−])*\d[\d.]*(·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?(\u00a0%)?")
+_NUMBER_IN_CELL = re.compile(r"(?:&[gl]t;|[≤≥−])*\d[\d.]*(·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?(\u00a0%)?")
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ def write_report(
     measured = zip(cases, measurements, strict=True)
     movable = [(case, of) for case, of in measured if study.published and has_sliders(case)]
     # Where the branch relaxes fastest, its damper and the parallel one are told apart least.
-    movable.sort(key=lambda it: it[0].parameters["c"] / it[0].parameters["k"])
+    movable.sort(key=lambda pair: pair[0].parameters["c"] / pair[0].parameters["k"])
     errors, judged, covered, compared, beside, models = (
         [row for csv in downloads if csv.name.startswith(name) for row in read_table(csv)]
         for name in _ANSWERING
@@ -116,7 +116,7 @@ def write_report(
     listed: list[Entry] = []
     for path, csv in zip(tables, downloads, strict=True):
         entry, download = entry_of(path, owners, texts), data_url("text/csv", whole(csv).encode())
-        if entry.caption in (it.caption for it in listed):
+        if entry.caption in (before.caption for before in listed):
             entry = replace(entry, caption="")
         listed.append(replace(entry, content=_table(path, titles), download=download))
     drawn = [
@@ -126,16 +126,18 @@ def write_report(
     if study.published:
         story = _as_in_paper(drawn, [study.cases[name] for name in study.published])
     else:
-        drawn, listed = ([it for it in own if _is_own(it, study)] for own in (drawn, listed))
-        story = [it for it in drawn if it.name in _UNFOLDED]
-    told = [replace(it, title="What a trace tells") for it in drawn if it.name == "answer"]
+        drawn, listed = (
+            [item for item in items if _is_own(item, study)] for items in (drawn, listed)
+        )
+        story = [entry for entry in drawn if entry.name in _UNFOLDED]
+    told = [replace(item, title="What a trace tells") for item in drawn if item.name == "answer"]
     placed = {entry.file for entry in told + story}
     folded: dict[str, list[Entry]] = {}
     for entry in drawn:
         if entry.file not in placed:
             folded.setdefault(owners.get(entry.whose, "The study"), []).append(entry)
-    found = [*zip(cases, map(read_verdicts, verdicts), strict=True)]
-    own = [it for case, it in found if case.recorded and not study.published]
+    judged_cases = [*zip(cases, map(read_verdicts, verdicts), strict=True)]
+    recorded = [told for case, told in judged_cases if case.recorded and not study.published]
     asked = compared, study.shown_method.title
     who = "Run again, the paper's" if study.published else "The"
     every = [*titles.values()]
@@ -143,25 +145,25 @@ def write_report(
     shown = {
         "sliders": slid(*movable[0]) if movable else None,
         "answers": [
-            answers.say_what_recordings_tell(own),
+            answers.say_what_recordings_tell(recorded),
             answers.say_what_traces_tell(covered, titles),
             answers.say_what_the_study_gives(*asked, titles, who, study.optimum_tolerance),
             answers.say_which_method_finds_it(*asked),
         ],
         "compared": answers.rows_beside_the_paper(beside, titles)
         or answers.compared_rows(errors, judged, titles),
-        "cases": found,
+        "cases": judged_cases,
         "better": {
             case.name: answers.say_which_model_is_better(
-                models, case.name, case.sample.candidate, own["fit"]
+                models, case.name, case.sample.candidate, told_of_case["fit"]
             )
-            for case, own in found
+            for case, told_of_case in judged_cases
         },
         "told": told,
         "story": story,
         "folded": folded,
-        "evidence_tables": [it for it in listed if it.name in _EVIDENCE],
-        "tables": [it for it in listed if it.name not in _EVIDENCE],
+        "evidence_tables": [entry for entry in listed if entry.name in _EVIDENCE],
+        "tables": [entry for entry in listed if entry.name not in _EVIDENCE],
         # But for what changes no result.
         "config": yaml.safe_dump(
             {key: value for key, value in study.plain.items() if key != "pdf"}, allow_unicode=True
@@ -215,10 +217,14 @@ def _as_in_paper(figures: Sequence[Entry], published: Sequence[Case]) -> list[En
     first = published[0].name if published else ""
     if numbers.get((first, "fit")) == _FIRST_FIT:
         numbers |= {(first, "convergence"): _FIRST_FIT - 1, (first, "evolution"): _FIRST_FIT + 1}
-    found = {numbers.get((it.whose, it.name)): it for it in figures}
+    by_number = {numbers.get((entry.whose, entry.name)): entry for entry in figures}
     return [
-        replace(it, title=f"Figure {n}. {it.title}", caption=it.caption * (it.whose == first))
-        for n, it in sorted((n, it) for n, it in found.items() if n is not None)
+        replace(
+            by_number[n],
+            title=f"Figure {n}. {by_number[n].title}",
+            caption=by_number[n].caption * (by_number[n].whose == first),
+        )
+        for n in sorted(n for n in by_number if n is not None)
     ]
 
 
@@ -242,12 +248,12 @@ def _table(path: Path, titles: Mapping[str, str]) -> str:
 
     def cell(match: re.Match[str]) -> str:
         text = escape(titles[match[1]]) if match[1] in titles else legible(match[1])
-        return f"<td{' class=number' * bool(_NUMBER.fullmatch(text))}>{text}</td>"
+        return f"<td{' class=number' * bool(_NUMBER_IN_CELL.fullmatch(text))}>{text}</td>"
 
-    found = re.search(r"<table.*</table>", path.read_text(encoding="utf-8"), re.DOTALL)
-    if found is None:
+    table = re.search(r"<table.*</table>", path.read_text(encoding="utf-8"), re.DOTALL)
+    if table is None:
         raise BiogripError(f"{path}: holds no table.")
-    return re.sub("<td>(.*?)</td>", cell, found[0].replace("<th>", '<th scope="col">'))
+    return re.sub("<td>(.*?)</td>", cell, table[0].replace("<th>", '<th scope="col">'))
 
 
 def has_sliders(case: Case) -> bool:
@@ -260,22 +266,25 @@ def has_sliders(case: Case) -> bool:
 
 def slid(case: Case, measurements: Path) -> dict[str, Any]:
     """Return a case's first trace, thinned, with its parameters, arm and steps, in SI units."""
-    recorded, gripper = read_measurements(measurements, [TRACE]), case.experiment.gripper
-    readings, target = recorded.readings[TRACE], recorded.target
+    recorded, gripper = read_measurements(measurements, [JUDGED_SEED]), case.experiment.gripper
+    readings, target = recorded.readings[JUDGED_SEED], recorded.target
     assert target is not None
     factor, unit = scale_of(readings, case.instrument.read.unit)
-    stride = -(-len(readings) // _MOST_READINGS)
+    stride = -(-len(readings) // _READINGS_ON_SCREEN)
     values = case.parameters.values()
     return {
         "title": case.title,
         "noise": f"{factor * rms((readings - target)[::stride]):.4g}",
         "times": recorded.time_s[::stride].tolist(),
-        "readings": significant(readings[::stride], _DIGITS).tolist(),
+        "readings": significant(readings[::stride], _SCREEN_DIGITS).tolist(),
         "factor": factor,
         "unit": unit,
         "read": with_unit(case.instrument.read.title, unit),
         "sample": {name: case.parameters[name] for name in _SLID},
-        "ends": [math.log10(min(values) / _BEYOND), math.log10(max(values) * _BEYOND)],
+        "ends": [
+            math.log10(min(values) / _SLIDER_BEYOND),
+            math.log10(max(values) * _SLIDER_BEYOND),
+        ],
         "arm": {
             "stiffness": gripper.left.stiffness_Nm_per_rad,
             "damping": gripper.left.damping_Nms_per_rad,

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 # Few enough that results on different processors agree.
-_DIGITS = 8
+_HISTORY_DIGITS = 8
 
 ENCODABLE = "encodable_misfit"
 """Last column of the identifications of a case: lowest misfit that genes can encode of the
@@ -50,7 +50,7 @@ INTERVALS = RowFile(
 limits, and the estimate with uninformed parameters fixed at their true values. For some seeds, all
 quantities also have the verdict and limits that users are shown, from whole profiles."""
 
-READINGS = RowFile(
+READING_FILE = RowFile(
     "readings",
     (
         *("case", "reading", "seed"),
@@ -64,7 +64,7 @@ READINGS = RowFile(
 def read_readings(path: Path, case: Case) -> "pd.DataFrame":
     """Read what the reading that a file is named like found; parameters stand by name."""
     seeds = range(case.seeds)
-    frame = READINGS.read(path, case=[case.name], reading=[path.stem], seed=seeds)
+    frame = READING_FILE.read(path, case=[case.name], reading=[path.stem], seed=seeds)
     return frame.rename(columns={p.column: p.name for p in SINGLE_BRANCH})
 
 
@@ -78,7 +78,7 @@ def parameters_in_file(model: SampleModel) -> tuple[Parameter, ...]:
     return SINGLE_BRANCH if covered else model.parameters
 
 
-def columns(model: SampleModel) -> tuple[str, ...]:
+def identification_columns(model: SampleModel) -> tuple[str, ...]:
     """Return the columns of a file of identifications."""
     return (
         *("case", "method", "seed"),
@@ -88,7 +88,7 @@ def columns(model: SampleModel) -> tuple[str, ...]:
 
 
 def row_of(experiment: Experiment, answer: Fit, noise_rms: float | None) -> tuple[str | int, ...]:
-    """Return what `columns` has of an identification, after case, method and seed.
+    """Return what `identification_columns` has of an identification, after case, method and seed.
 
     Numbers have six significant digits: more than a trace determines, and few enough that
     results on different processors agree. The noise of a recorded trace is None.
@@ -122,7 +122,7 @@ def history_of(method: str, seed: int, experiment: Experiment, answer: Fit) -> d
         "generation": np.arange(generations),
         "evaluations": np.asarray(history.evaluations),
         **{
-            name: significant(np.broadcast_to(values, generations), _DIGITS)
+            name: significant(np.broadcast_to(values, generations), _HISTORY_DIGITS)
             for name, values in columns_by_name.items()
         },
     }
@@ -130,17 +130,21 @@ def history_of(method: str, seed: int, experiment: Experiment, answer: Fit) -> d
 
 def read_identifications(path: Path, case: Case, method: str | None = None) -> "pd.DataFrame":
     """Read identifications of a case by all methods of the study, or by one, in all seeds."""
-    frame = _read(path, case, case.study.config.methods, range(case.seeds))
+    frame = _read_rows(path, case, case.study.config.methods, range(case.seeds))
     return frame if method is None else frame[frame["method"] == method].reset_index(drop=True)
 
 
 def read_batch(path: Path, case: Case) -> "pd.DataFrame":
     """Read identifications by the method and in the seeds that the path of a batch names."""
-    return _read(path, case, [path.parent.name], seeds_of(path.stem))
+    return _read_rows(path, case, [path.parent.name], seeds_of(path.stem))
 
 
-def _read(path: Path, case: Case, methods: Sequence[str], seeds: range) -> "pd.DataFrame":
-    file = RowFile("identifications", columns(case.sample.model), ("case", "method", "stop_reason"))
+def _read_rows(path: Path, case: Case, methods: Sequence[str], seeds: range) -> "pd.DataFrame":
+    file = RowFile(
+        "identifications",
+        identification_columns(case.sample.model),
+        ("case", "method", "stop_reason"),
+    )
     return file.read(path, case=[case.name], method=methods, seed=seeds)
 
 
@@ -160,7 +164,7 @@ def read_verdicts(path: Path) -> dict[str, Any]:
 
 ALL = "all"
 """Name of the basin of all runs."""
-_FEWEST = 0.1
+_LEAST_SHARE_OF_BASIN = 0.1
 """Least share of runs that makes a basin."""
 
 
@@ -171,7 +175,7 @@ def basins(identified: "pd.DataFrame", tolerance: float) -> "dict[str, pd.DataFr
     one, `ALL`, as where the noise is unknown.
     """
     near = near_noise(identified, tolerance)
-    if not _FEWEST <= near.mean() <= 1 - _FEWEST:
+    if not _LEAST_SHARE_OF_BASIN <= near.mean() <= 1 - _LEAST_SHARE_OF_BASIN:
         return {ALL: identified}
     return {"near the noise": identified[near], "above the noise": identified[~near]}
 

@@ -14,8 +14,8 @@ from biogrip.traces.reader import Recording
 from biogrip_study.records.rows import read_arrays, write_arrays
 
 # More than any instrument gives, and few enough that results on different processors agree.
-_DIGITS = 9
-_WRITTEN = f"{{:.{_DIGITS - 1}e}}"
+_TARGET_DIGITS = 9
+_WRITTEN = f"{{:.{_TARGET_DIGITS - 1}e}}"
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ def write_target(
     simulated = [read]
     if jaw_force_N is not None:
         largest = float(np.max(np.abs(jaw_force_N)))
-        digit = 10.0 ** (math.floor(math.log10(largest)) + 1 - _DIGITS) if largest else 1.0
+        digit = 10.0 ** (math.floor(math.log10(largest)) + 1 - _TARGET_DIGITS) if largest else 1.0
         columns.append("jaw_force_N")
         simulated.append((np.round(jaw_force_N / digit) + 0.0) * digit)
     rows = (

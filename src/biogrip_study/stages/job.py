@@ -49,7 +49,7 @@ class _Named:
 
 # Blocks of which a rule may name single keys.
 _SPLIT = {"measurement": MeasurementBlock, "identifiability": Identifiability}
-_NAMED = {
+_WITH_KEYS = {
     kind: type(f"_NamedOf{kind.__name__}", (_Named, kind), {})
     for kind in (StudyConfig, CaseBlock, *_SPLIT.values())
 }
@@ -83,7 +83,7 @@ def keys_of_cases(study: Study, *keys: str) -> list[str]:
     return [f"cases.{name}.{key}" for name in study.cases for key in keys]
 
 
-def case_of(name: str, given: Mapping[str, Any]) -> Case:
+def case_with_keys(name: str, given: Mapping[str, Any]) -> Case:
     """Return a case of which some keys are given, by `settings`."""
     study = Study(_named(StudyConfig, given))
     return Case(name, _named(CaseBlock, given), study.config, study=study)
@@ -113,7 +113,7 @@ def _named(kind: Any, given: Mapping[str, Any], **keys: Any) -> Any:
         elif field.name in given:
             made = field.default_factory
             keys[field.name] = field.default if made is MISSING else made()
-    return _NAMED[kind](keys)
+    return _WITH_KEYS[kind](keys)
 
 
 def batch_names(seeds: int, size: int) -> list[str]:
@@ -139,7 +139,7 @@ def logged(job: Any) -> Iterator[None]:
 
 def job_case(job: Any) -> Case:
     """Return the case of a job, with the keys of the config that its rule names."""
-    return case_of(job.wildcards.case, job_settings(job))
+    return case_with_keys(job.wildcards.case, job_settings(job))
 
 
 def job_study(job: Any) -> Study:

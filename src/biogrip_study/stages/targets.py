@@ -25,7 +25,7 @@ from biogrip_study.records.rows import write_arrays
 from biogrip_study.records.traces import Measurements, read_target, write_measurements, write_target
 
 
-def simulate(case: Case, target: Path) -> None:
+def simulate_target(case: Case, target: Path) -> None:
     """Simulate a case, and write its target, CSV.
 
     A response that is not finite, or turns the arms beyond the combs' stroke, is an error.

@@ -29,7 +29,7 @@ from biogrip_study.records.identifications import (
 from biogrip_study.tables.layout import Column, Row, ShownTable, titled
 
 _PERCENTILES = {"p05": 5, "p25": 25, "median": 50, "p75": 75, "p95": 95}
-_COLUMNS = (
+_ERROR_COLUMNS = (
     *titled("case", "parameter", "unit"),
     Column("target", "Target", 4),
     Column("paper_identified", "Paper", 4),
@@ -49,10 +49,10 @@ _BASINS = (
 )
 
 
-def _columns(near_noise_tolerance: float) -> tuple[Column, ...]:
+def _error_columns(near_noise_tolerance: float) -> tuple[Column, ...]:
     share = f"Share {near_noise_words(near_noise_tolerance)}"
     ends = (Column(f"near_noise_{end}", f"95 % {end}", 2) for end in ("from", "to"))
-    return (*_COLUMNS, Column("near_noise_share", share, 2), *ends)
+    return (*_ERROR_COLUMNS, Column("near_noise_share", share, 2), *ends)
 
 
 def errors_of_case(case: Case, identifications: Path) -> ShownTable:
@@ -88,7 +88,7 @@ def errors_of_case(case: Case, identifications: Path) -> ShownTable:
         if case.parameters
         else f"{case.title}: parameters identified in the recorded trace."
     )
-    return ShownTable(caption, _columns(tolerance), rows)
+    return ShownTable(caption, _error_columns(tolerance), rows)
 
 
 def error_percent(target: float | None, identified: Array) -> Array:
@@ -119,7 +119,7 @@ def errors(study: Study, identifications: list[Path]) -> ShownTable:
         # Text, as ">100", stays; not every case or parameter has one.
         with suppress(ValueError, TypeError, KeyError):
             row["paper_error_percent"] = float(row["paper_error_percent"])
-    columns = _columns(study.near_noise_tolerance)
+    columns = _error_columns(study.near_noise_tolerance)
     return ShownTable(f"Identification errors of all cases. {_BASINS}", columns, rows)
 
 

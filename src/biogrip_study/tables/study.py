@@ -125,7 +125,7 @@ def read_fits(study: Study, path: Path) -> pd.DataFrame:
     return MODEL_FITS.read(path, case=[case.name], model=case.models, seed=seeds_of(path.stem))
 
 
-_COLUMNS = (
+_COVERAGE_COLUMNS = (
     *titled("case", "quantity", "unit"),
     Column("target", "Target", 4),
     Column("bound_percent", "Cramér-Rao bound, rest known %", 3),
@@ -166,7 +166,9 @@ def coverage(
                 continue
             truth = quantity_value(quantity.label, case.parameters) or 0.0
             head = {"case": name, "quantity": quantity.label, "unit": quantity.unit}
-            numbers = _spreads(fitted, truth, 100 * limit, case.confidence) | _shown(shown, truth)
+            numbers = _spreads(fitted, truth, 100 * limit, case.confidence) | _verdicts_shown(
+                shown, truth
+            )
             rows.append({**head, "target": truth, **numbers})
     caption = (
         "Least squares over many seeds, for every quantity that a case's traces should determine: "
@@ -179,7 +181,7 @@ def coverage(
         f"in {_judged_seeds(study)}, and how many of them are true; one-sided limits hold more "
         "often than the confidence says."
     )
-    return ShownTable(caption, _COLUMNS, rows)
+    return ShownTable(caption, _COVERAGE_COLUMNS, rows)
 
 
 def bounds_at_truth(
@@ -245,7 +247,7 @@ def _spreads(fitted: pd.DataFrame, truth: float, bound: float, confidence: float
     }
 
 
-def _shown(judged: pd.DataFrame, truth: float) -> Row:
+def _verdicts_shown(judged: pd.DataFrame, truth: float) -> Row:
     """Count verdicts from whole profiles, and the true ones among them."""
     counts: Row = {"shown_seeds": len(judged)}
     held = _holds(judged, truth, "shown_")

@@ -1,6 +1,6 @@
 """Points of a sweep: errors of what is identified, and the share of seeds in the true basin.
 
-`judge` writes them, a row per point, method and quantity; a table shows some.
+`judge_points` writes them, a row per point, method and quantity; a table shows some.
 """
 
 import math
@@ -36,10 +36,10 @@ POINTS = RowFile(
 )
 
 # Log factor, and multiple of the bound, within which a value is in the basin of the truth.
-_FACTOR, _BOUNDS = math.log(2), 4.0
+_FACTOR, _BOUNDS_OF_BASIN = math.log(2), 4.0
 
 
-def judge(
+def judge_points(
     study: Study, sweep: str, identifications: list[Path], calibrated: list[Path], points: Path
 ) -> None:
     """Compute errors and shares of successful seeds at every point of a sweep.
@@ -59,34 +59,36 @@ def judge(
             case = study.points[point.name]
             problem = with_calibration(case.experiment, calibrations.get(point.name, []))
             bounds[point.name] = bounds_percent(problem, case.noise, true, case.times_s)
-        heads = headlines([(q.label, percent) for found in bounds.values() for q, percent in found])
+        heads = headlines(
+            [(q.label, percent) for of_point in bounds.values() for q, percent in of_point]
+        )
         for point, method in product(grid, study.config.methods):
             case = study.points[point.name]
-            found = pd.concat([read_batch(path, case) for path in files[point.name, method]])
+            runs = pd.concat([read_batch(path, case) for path in files[point.name, method]])
             if case.noise.absent:
                 # Without noise, the misfit of the true values rounded to the genes' digits.
-                found = found.assign(noise_rms=_resolution(case, true))
-            near = float(np.mean(near_noise(found, study.near_noise_tolerance)))
+                runs = runs.assign(noise_rms=_resolution(case, true))
+            near = float(np.mean(near_noise(runs, study.near_noise_tolerance)))
             head = point.name, point.row.shown, point.column.shown, method
-            judged = _judged(case, true, found, bounds[point.name], heads, near)
-            rows += ((*head, *own) for own in judged)
+            judged = _judged(case, true, runs, bounds[point.name], heads, near)
+            rows += ((*head, *numbers) for numbers in judged)
     POINTS.write(points, rows)
 
 
 def _judged(
     point: Case,
     true: Mapping[str, float],
-    found: pd.DataFrame,
+    runs: pd.DataFrame,
     bounds: list[tuple[Quantity, float]],
     heads: list[str],
     near: float,
 ) -> Iterator[tuple[str | int, ...]]:
     searched = point.experiment.searched.parameters
-    errors, inside = {}, np.ones(len(found), dtype=bool)
+    errors, inside = {}, np.ones(len(runs), dtype=bool)
     for q, percent in bounds:
         members = [searched[index] for index in q.members]
         truth = sum(true[p.name] for p in members)
-        values = found[[p.column for p in members]].sum(axis=1).to_numpy(float)
+        values = runs[[p.column for p in members]].sum(axis=1).to_numpy(float)
         errors[q.label] = 100 * np.abs(values - truth) / (truth or np.nan)
         if q.label in heads:
             inside &= in_basin(values, truth, percent / 100)
@@ -95,7 +97,7 @@ def _judged(
         medians = [np.median(some) if len(some) else np.nan for some in (every, every[inside])]
         share = float(np.mean(inside)) if heads else np.nan
         numbers = (near, share, *medians, percent)
-        yield q.label, len(found), *("" if np.isnan(it) else f"{it:.6g}" for it in numbers)
+        yield q.label, len(runs), *("" if np.isnan(x) else f"{x:.6g}" for x in numbers)
 
 
 def in_basin(values: Array, truth: float, bound: float) -> BoolArray:
@@ -106,7 +108,7 @@ def in_basin(values: Array, truth: float, bound: float) -> BoolArray:
     """
     with np.errstate(divide="ignore"):
         away = np.abs(np.log(values / truth))
-    return away <= np.fmax(_FACTOR, _BOUNDS * bound)
+    return away <= np.fmax(_FACTOR, _BOUNDS_OF_BASIN * bound)
 
 
 def _resolution(point: Case, true: Mapping[str, float]) -> float:
@@ -170,8 +172,8 @@ def robustness(study: Study, sweep: str, points: Path) -> ShownTable:
     words = near_noise_words(study.near_noise_tolerance)
     columns = (
         Column("case", "Case"),
-        Column("row", _title(study, block.rows)),
-        Column("column", _title(study, block.columns)),
+        Column("row", _axis_heading(study, block.rows)),
+        Column("column", _axis_heading(study, block.columns)),
         Column("quantity", "Quantity"),
         *(
             Column(
@@ -191,7 +193,7 @@ def robustness(study: Study, sweep: str, points: Path) -> ShownTable:
     return ShownTable(caption, columns, rows)
 
 
-def _title(study: Study, axis: AxisBlock) -> str:
+def _axis_heading(study: Study, axis: AxisBlock) -> str:
     """Return the title of an axis with its unit, marked if the paper does not give the values."""
     keys = {f"{key}." for value in axis.levels for key in value.overrides}
     reconstructed = tuple(f"{name}." for name in study.config.reconstructed)
