@@ -321,7 +321,7 @@ def assert_in_order(parameters: Array) -> None:
 
 def test_a_method_counts_branches_as_they_relax() -> None:
     """This population would come out the other way round."""
-    settings = GeneticSettings(60, 30, "pairs", 1, -1, 1, 0.5, 1, 4, 6, 12)
+    settings = GeneticSettings(60, 30, "pairs", "once", 1, 0.5, 1, 4, 6, 12)
     given = problems(1, 1e-3), [np.random.default_rng(0)], silent
     (answer,) = identifier("genetic", settings)(*given)
     assert_in_order(answer.parameters)
