@@ -174,20 +174,21 @@ def _judge_runs(
         str(title): (runs, *decide(results, runs, **rule))
         for title, runs in group[group["judging"]].groupby("reading", sort=False)
     }
-    title, (runs, _, _, more) = next(iter(found.items()))
-    told = _statistics(runs) | {"study": results.study} | more
-    said = f"{Evidence().format(evidence, **told)[:-1]} with {title}"
-    beside = group[~group["judging"] & (group["reading"] == TEXT)]
-    if len(beside) and rule:
-        said += f"; {decide(results, beside, **rule)[2]['number']} with {TEXT}"
+    title, (runs, *_, more) = next(iter(found.items()))
+    said = Evidence().format(evidence, **_statistics(runs), study=results.study, **more)
     verdicts = [verdict for _, verdict, *_ in found.values()]
-    if len(found) == 1 or not rule:
-        return verdicts[0], f"{said}."
-    ordered = sorted(found.items(), key=lambda item: item[1][2])
-    ends = (f"{of[3]['number']} (“{name}”)" for name, of in (ordered[0], ordered[-1]))
-    counts = (f"{count} {verdict}" for verdict, count in Counter(verdicts).items())
-    range_of = f"; {' to '.join(ends)} under {len(found)} interpretations, {', '.join(counts)}."
-    return agreed(verdicts), said + range_of
+    if not rule:
+        return verdicts[0], said
+    said += f" Runs have {title}"
+    beside = group[~group["judging"] & (group["reading"] == TEXT)]
+    if len(beside):
+        said += f"; with {TEXT} it is {decide(results, beside, **rule)[2]['number']}"
+    if len(found) > 1:
+        ordered = sorted(found.items(), key=lambda item: item[1][2])
+        ends = (f"{of[3]['number']} (“{name}”)" for name, of in (ordered[0], ordered[-1]))
+        counts = (f"{count} {verdict}" for verdict, count in Counter(verdicts).items())
+        said += f"; over {len(found)} interpretations {' to '.join(ends)}, {', '.join(counts)}"
+    return agreed(verdicts), f"{said}."
 
 
 def agreed(verdicts: Sequence[str]) -> str:
@@ -199,7 +200,7 @@ def agreed(verdicts: Sequence[str]) -> str:
 def _statistics(group: pd.DataFrame) -> dict[str, Any]:
     """Return what evidence may name of a group of rows, whatever the rule."""
     numbers, every = group.select_dtypes("number"), group.reset_index(drop=True)
-    told = {"rows": len(group), "all": every, "first": every.iloc[0]}
+    told = {"rows": len(group), "all": every, "first": {it: every[it].iloc[0] for it in every}}
     told |= {"least": numbers.min(), "median": numbers.median(), "most": numbers.max()}
     return told | {f"p{percent}": numbers.quantile(percent / 100) for percent in (5, 95)}
 
@@ -263,13 +264,11 @@ def judge_grippers(
     evidence: str,
     *,
     others: Callable[[Results, Gripper], Iterator[Gripper]],
-    least: float,
-    above: str,
-    below: str,
+    changes: bool,
 ) -> list[Judged]:
     """Judge by the factor by which other grippers, known, change what noise allows at best.
 
-    The noise is that of the case in rad. Factors above `least` have one verdict, others another.
+    The noise is that of the case in rad. `changes` tells which of both is claimed.
     """
     judged = []
     for case in results.study.cases.values():
@@ -283,8 +282,9 @@ def judge_grippers(
             every.append([bound for _, bound in bounds])
         told = np.array(every)[:, np.array(every[0]) < DETERMINED_PERCENT]
         factor = float(np.max(told.max(axis=0) / told.min(axis=0)))
-        said = evidence.format(factor=factor, percent=100 * (factor - 1))
-        judged.append((f"Table {case.published.table}", above if factor > least else below, said))
+        said = evidence.format(factor=factor)
+        claimed = factor > 1 + NEAR if changes else factor <= 1 + CLOSE
+        judged.append((f"Table {case.published.table}", REPLICATED if claimed else NOT, said))
     return judged
 
 
@@ -299,11 +299,11 @@ def _devices(results: Results, gripper: Gripper) -> Iterator[Gripper]:
     for factor in (2 / 3, 4 / 3):
         yield replace(gripper, arm_length_m=factor * gripper.arm_length_m)
     for factor in (0.5, 2.0):
-        arms = {
-            side: replace(arm, stiffness_Nm_per_rad=factor * arm.stiffness_Nm_per_rad)
-            for side, arm in (("left", gripper.left), ("right", gripper.right))
-        }
-        yield replace(gripper, **arms)
+        left, right = (
+            replace(arm, stiffness_Nm_per_rad=factor * arm.stiffness_Nm_per_rad)
+            for arm in (gripper.left, gripper.right)
+        )
+        yield replace(gripper, left=left, right=right)
 
 
 def judge_free_arm(results: Results, evidence: str) -> list[Judged]:
@@ -322,12 +322,10 @@ def judge_free_arm(results: Results, evidence: str) -> list[Judged]:
     return [("", verdict, evidence.format(*errors, noise=100 * test.noise_level))]
 
 
-_CHANGES = {"least": 1 + NEAR, "above": REPLICATED, "below": NOT}
-_STAYS = {"least": 1 + CLOSE, "above": NOT, "below": REPLICATED}
 JUDGES: Mapping[str, Any] = {
     "rows": judge_rows,
-    "jaw_gap": partial(judge_grippers, others=_at_contact, **_STAYS),
-    "device": partial(judge_grippers, others=_devices, **_CHANGES),
+    "jaw_gap": partial(judge_grippers, others=_at_contact, changes=False),
+    "device": partial(judge_grippers, others=_devices, changes=True),
     "free_arm": judge_free_arm,
 }
 

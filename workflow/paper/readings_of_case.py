@@ -13,7 +13,7 @@ from biogrip.config.source import overlaid
 from biogrip.fit.least_squares import fit_from
 from biogrip.fit.problem import Fit, TraceProblem
 from biogrip.keys import built
-from biogrip.physics.noise import add_noise, rms
+from biogrip.physics.noise import add_noise, rms, stream
 from biogrip.physics.sample_model import SINGLE_BRANCH
 from biogrip.terminal import Progress
 from biogrip_study.config.case_blocks import CaseBlock
@@ -46,7 +46,7 @@ def identify_reading(case: Case, reading: str, target: Path, rows: Path) -> None
 def _rows(case: Case, name: str, time_s: Array, clean: Array) -> Iterator[tuple[str | int, ...]]:
     progress, experiment = Progress(f"{case.name}, {name}", case.seeds), case.experiment
     for seeds in seed_groups(range(case.seeds)):
-        rngs = [experiment.stream("noise", seed) for seed in seeds]
+        rngs = _streams(case, seeds, "noise")
         traces = [add_noise(clean, case.noise, rng, time_s) for rng in rngs]
         answers = _best(case, name, seeds, experiment.of_each(time_s, traces))
         for seed, trace, answer in zip(seeds, traces, answers, strict=True):
@@ -62,12 +62,15 @@ def _rows(case: Case, name: str, time_s: Array, clean: Array) -> Iterator[tuple[
         progress.done(len(seeds))
 
 
+def _streams(case: Case, seeds: Sequence[int], purpose: str) -> list[np.random.Generator]:
+    return [stream(case.study.config.study_seed, case.name, seed, purpose) for seed in seeds]
+
+
 def _best(case: Case, name: str, seeds: Sequence[int], problems: list[TraceProblem]) -> list[Fit]:
     """Return the best run on each trace, with the local fit that follows if there is one."""
     reading, runs = case.study.config.readings[name], list[list[Fit]]()
     for number in range(reading.runs):
-        purpose = f"genetic {number}" if number else "genetic"
-        rngs = [case.experiment.stream(purpose, seed) for seed in seeds]
+        rngs = _streams(case, seeds, f"genetic {number}" if number else "genetic")
         runs.append(identify_many(problems, case.block.method("genetic"), rngs))
     best = [min(of_trace, key=attrgetter("misfit")) for of_trace in zip(*runs, strict=True)]
     if not reading.polished:
