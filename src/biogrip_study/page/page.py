@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from html import escape
 from importlib.metadata import version
@@ -104,76 +104,106 @@ def write_report(
     }
     titles = {case.name: case.title for case in study.cases.values()}
     owners = titles | {name: sweep.title or name for name, sweep in study.config.sweeps.items()}
-    cases = list(study.cases.values())
-    measured = zip(cases, measurements, strict=True)
-    movable = [(case, of) for case, of in measured if study.published and has_sliders(case)]
-    # Where the branch relaxes fastest, its damper and the parallel one are told apart least.
-    movable.sort(key=lambda pair: pair[0].parameters["c"] / pair[0].parameters["k"])
-    errors, judged, covered, compared, beside, models = (
-        [row for csv in downloads if csv.name.startswith(name) for row in read_table(csv)]
-        for name in _ANSWERING
-    )
-    listed: list[Entry] = []
-    for path, csv in zip(tables, downloads, strict=True):
-        entry, download = entry_of(path, owners, texts), data_url("text/csv", whole(csv).encode())
-        if entry.caption in (before.caption for before in listed):
-            entry = replace(entry, caption="")
-        listed.append(replace(entry, content=_table(path, titles), download=download))
+    judged = [*zip(study.cases.values(), map(read_verdicts, verdicts), strict=True)]
     drawn = [
         replace(entry_of(path, owners, texts), content=image, size=size)
         for path, (image, size) in zip(figures, _images(figures), strict=True)
     ]
-    if study.published:
-        story = _as_in_paper(drawn, [study.cases[name] for name in study.published])
-    else:
-        drawn, listed = (
-            [item for item in items if _is_own(item, study)] for items in (drawn, listed)
+    listed = [
+        replace(
+            entry_of(path, owners, texts),
+            content=_table(path, titles),
+            download=data_url("text/csv", whole(csv).encode()),
         )
-        story = [entry for entry in drawn if entry.name in _UNFOLDED]
-    told = [replace(item, title="What a trace tells") for item in drawn if item.name == "answer"]
-    placed = {entry.file for entry in told + story}
-    folded: dict[str, list[Entry]] = {}
-    for entry in drawn:
-        if entry.file not in placed:
-            folded.setdefault(owners.get(entry.whose, "The study"), []).append(entry)
-    judged_cases = [*zip(cases, map(read_verdicts, verdicts), strict=True)]
-    recorded = [told for case, told in judged_cases if case.recorded and not study.published]
-    asked = compared, study.shown_method.title
-    who = "Run again, the paper's" if study.published else "The"
-    every = [*titles.values()]
-    named = ", ".join(every) if len(every) <= _MOST_TITLES else f"{len(every)} samples"
+        for path, csv in zip(tables, downloads, strict=True)
+    ]
     shown = {
-        "sliders": slid(*movable[0]) if movable else None,
-        "answers": [
-            answers.say_what_recordings_tell(recorded),
-            answers.say_what_traces_tell(covered, titles),
-            answers.say_what_the_study_gives(*asked, titles, who, study.optimum_tolerance),
-            answers.say_which_method_finds_it(*asked),
-        ],
-        "compared": answers.rows_beside_the_paper(beside, titles)
-        or answers.compared_rows(errors, judged, titles),
-        "cases": judged_cases,
-        "better": {
-            case.name: answers.say_which_model_is_better(
-                models, case.name, case.sample.candidate, told_of_case["fit"]
-            )
-            for case, told_of_case in judged_cases
-        },
-        "told": told,
-        "story": story,
-        "folded": folded,
-        "evidence_tables": [entry for entry in listed if entry.name in _EVIDENCE],
-        "tables": [entry for entry in listed if entry.name not in _EVIDENCE],
+        "sliders": _sliders(study, measurements),
+        **_said(study, judged, downloads),
+        "cases": judged,
+        **_placed(study, drawn, owners),
+        **_tables_placed(study, listed),
         # But for what changes no result.
         "config": yaml.safe_dump(
             {key: value for key, value in study.plain.items() if key != "pdf"}, allow_unicode=True
         ),
-        "title": _QUESTION if study.published else named,
+        "title": _QUESTION if study.published else _names([*titles.values()]),
         "paper": bool(study.published),
         "versions": {"biogrip": __version__, **{name: version(name) for name in _LIBRARIES}},
     }
     for file, template in ((page, "report"), (front, "answers")):
         write_text(file, TEMPLATES.get_template(f"{template}.html.j2").render(shown))
+
+
+def _names(titles: Sequence[str]) -> str:
+    return ", ".join(titles) if len(titles) <= _MOST_TITLES else f"{len(titles)} samples"
+
+
+def _sliders(study: Study, measurements: Sequence[Path]) -> dict[str, Any] | None:
+    """Return what sliders of one of the paper's cases need; None if none can have them."""
+    measured = zip(study.cases.values(), measurements, strict=True)
+    movable = [(case, of) for case, of in measured if study.published and has_sliders(case)]
+    # Where the branch relaxes fastest, its damper and the parallel one are told apart least.
+    movable.sort(key=lambda pair: pair[0].parameters["c"] / pair[0].parameters["k"])
+    return slid(*movable[0]) if movable else None
+
+
+def _said(
+    study: Study, judged: Sequence[tuple[Case, Mapping[str, Any]]], downloads: Sequence[Path]
+) -> dict[str, Any]:
+    """Return the answers, and results beside the paper's or the truth."""
+    errors, verdicts, coverage, methods, beside, models = (
+        [row for csv in downloads if csv.name.startswith(name) for row in read_table(csv)]
+        for name in _ANSWERING
+    )
+    titles = {case.name: case.title for case in study.cases.values()}
+    recorded = [told for case, told in judged if case.recorded and not study.published]
+    asked = methods, study.shown_method.title
+    who = "Run again, the paper's" if study.published else "The"
+    return {
+        "answers": [
+            answers.say_what_recordings_tell(recorded),
+            answers.say_what_traces_tell(coverage, titles),
+            answers.say_what_the_study_gives(*asked, titles, who, study.optimum_tolerance),
+            answers.say_which_method_finds_it(*asked),
+        ],
+        "compared": answers.rows_beside_the_paper(beside, titles)
+        or answers.compared_rows(errors, verdicts, titles),
+        "better": {
+            case.name: answers.say_which_model_is_better(
+                models, case.name, case.sample.candidate, told["fit"]
+            )
+            for case, told in judged
+        },
+    }
+
+
+def _placed(study: Study, drawn: Sequence[Entry], owners: Mapping[str, str]) -> dict[str, Any]:
+    """Return figures by their place: what a trace tells, the story, and all others, folded."""
+    if study.published:
+        story = _as_in_paper(drawn, [study.cases[name] for name in study.published])
+    else:
+        drawn = [entry for entry in drawn if _is_own(entry, study)]
+        story = [entry for entry in drawn if entry.name in _UNFOLDED]
+    told = [replace(entry, title="What a trace tells") for entry in drawn if entry.name == "answer"]
+    unfolded = {entry.file for entry in told + story}
+    folded: dict[str, list[Entry]] = {}
+    for entry in drawn:
+        if entry.file not in unfolded:
+            folded.setdefault(owners.get(entry.whose, "The study"), []).append(entry)
+    return {"told": told, "story": story, "folded": folded}
+
+
+def _tables_placed(study: Study, listed: Iterable[Entry]) -> dict[str, list[Entry]]:
+    """Return tables by their place, no caption twice."""
+    places: dict[str, list[Entry]] = {"evidence_tables": [], "tables": []}
+    captions = set[str]()
+    for entry in listed:
+        once = replace(entry, caption="" if entry.caption in captions else entry.caption)
+        captions.add(entry.caption)
+        if study.published or _is_own(entry, study):
+            places["evidence_tables" if entry.name in _EVIDENCE else "tables"].append(once)
+    return places
 
 
 def write_summary(
