@@ -38,8 +38,6 @@ class Method:
     """Colour of its lines in figures, its own, of `biogrip.figures.style.COLORS`."""
     dashes: str
     """Their dashes, as Matplotlib has them."""
-    sure: bool = False
-    """True if it finds the global optimum of (nearly) every trace; tests hold it to that."""
     package: str = __package__
     """Package of its module, which has the method's name."""
 
@@ -64,7 +62,6 @@ METHODS: dict[str, Method] = {
             step="local fit",
             color="blue",
             dashes="--",
-            sure=True,
             package="biogrip.fit",
         ),
     )
