@@ -189,7 +189,7 @@ rule claims:
         tables=[
             file
             for file in made("tables", ".csv")
-            if not file.endswith(("/claims.csv", "/tables_5_to_7.csv"))
+            if Path(file).stem not in ("claims", "tables_5_to_7")
         ],
     output:
         table="results/tables/claims.csv",
