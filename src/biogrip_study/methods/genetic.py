@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from biogrip.arrays import Array, IntArray
+from biogrip.arrays import IntArray
 from biogrip.fit.problem import Fit, History, HistoryRow, ReportProgress, TraceProblem, silent
 from biogrip.keys import Block, Complaint
 from biogrip_study.methods.genome import Chromosomes, Genome, make_genome
@@ -77,19 +77,6 @@ def identify_many(
     progress: ReportProgress = silent,
 ) -> list[Fit]:
     """Identify samples of one model by the paper's genetic algorithm, all at once."""
-    return [found for found, _, _ in evolve(problems, settings, rngs, progress)]
-
-
-def evolve(
-    problems: Sequence[TraceProblem],
-    settings: GeneticSettings,
-    rngs: Sequence[np.random.Generator],
-    progress: ReportProgress = silent,
-) -> list[tuple[Fit, Array, Array]]:
-    """Identify samples as `identify_many` does; return the first and last survivors as well.
-
-    They are parameters, best first, (n_survivors, n_parameters).
-    """
     misfits = make_misfits([problem.residuals for problem in problems])
     genome = make_genome(problems[0].ranges)
 
@@ -110,7 +97,6 @@ def evolve(
     # In single bytes, which sorting and crossover copy in half of the time.
     everyone: Chromosomes = np.stack(drawn).astype(np.int8)
     survivors, ranking = select(everyone, ranked(everyone, running), genome, settings.survivors)
-    first, last = survivors, survivors.copy()
     improved, stalled = np.zeros_like(running), np.zeros(len(rngs), dtype=bool)
     courses: list[list[HistoryRow]] = [[] for _ in rngs]
     evaluations = settings.population
@@ -120,17 +106,16 @@ def evolve(
         waited = generation - 1 - improved[running] >= settings.patience
         if generation > settings.min_generations and waited.any():
             stalled[running[waited]] = True
-            last[running] = survivors
             running, survivors, ranking = running[~waited], survivors[~waited], ranking[~waited]
             if not len(running):
                 break
-        own_rngs = [rngs[population] for population in running.tolist()]
-        children, before = cross(survivors, genome, settings, own_rngs), ranking[:, 0]
+        rngs_running = [rngs[population] for population in running.tolist()]
+        children, before = cross(survivors, genome, settings, rngs_running), ranking[:, 0]
         if generation >= settings.mutation_start:
-            mutate(children, genome, settings, own_rngs)
+            mutate(children, genome, settings, rngs_running)
             if settings.mutants == "all":
                 others = survivors[:, 1:].copy()
-                mutate(others, genome, settings, own_rngs)
+                mutate(others, genome, settings, rngs_running)
                 children = np.concatenate((children, others), axis=1)
                 survivors, ranking = survivors[:, :1], ranking[:, :1]
         everyone = np.concatenate((survivors, children), axis=1)
@@ -141,14 +126,13 @@ def evolve(
         evaluations_of_all += children.shape[1] * len(running)
         record()
         progress(evaluations_of_all, float(ranking[:, 0].min()))
-    last[running] = survivors
-    found = []
+    fits = []
     for course, has_stalled in zip(courses, stalled.tolist(), strict=True):
         parameters, misfit, _, evaluations = course[-1]
         why = "stalled" if has_stalled else "generation limit"
         steps, history = len(course) - 1, History.of(course)
-        found.append(Fit(parameters, misfit, steps, evaluations, why, history))
-    return list(zip(found, genome.decode(first), genome.decode(last), strict=True))
+        fits.append(Fit(parameters, misfit, steps, evaluations, why, history))
+    return fits
 
 
 def select(
@@ -224,9 +208,9 @@ def mutate(
     rngs: Sequence[np.random.Generator],
 ) -> None:
     """Mutate individuals, (n_populations, n, n_genes), in place: redraw genes of some of them."""
-    for own, rng in zip(chromosomes, rngs, strict=True):
-        mutating = np.flatnonzero(rng.random(len(own)) < settings.mutation_probability)
+    for population, rng in zip(chromosomes, rngs, strict=True):
+        mutating = np.flatnonzero(rng.random(len(population)) < settings.mutation_probability)
         for _ in range(settings.mutated_genes):
             gene = rng.integers(genome.genes, size=len(mutating))
             low, high = genome.low[gene], genome.high[gene]
-            own[mutating, gene] = rng.integers(low, high, endpoint=True)
+            population[mutating, gene] = rng.integers(low, high, endpoint=True)

@@ -157,15 +157,17 @@ def lowest_encodable(
     steps = np.array(sorted(every, key=np.count_nonzero))
     steps = steps[np.count_nonzero(steps, axis=1) <= _AT_ONCE]
     columns = zip(values, starts.T, strict=True)
-    places = np.stack([abs(own - start[:, None]).argmin(axis=1) for own, start in columns], axis=1)
+    places = np.stack(
+        [abs(encodable - start[:, None]).argmin(axis=1) for encodable, start in columns], axis=1
+    )
     lowest = np.inf
     while len(places):
         around = np.unique(places, axis=0)[:, None] + steps
-        np.clip(around, 0, [len(own) - 1 for own in values], out=around)
+        np.clip(around, 0, [len(encodable) - 1 for encodable in values], out=around)
         columns = zip(values, around.reshape(-1, len(values)).T, strict=True)
-        found = misfit(np.stack([own[at] for own, at in columns], axis=1))
-        found = found.reshape(around.shape[:2])
-        best = np.arange(len(around)), found.argmin(axis=1)
-        places = around[best][found[best] < (1 - _LEAST) * found[:, 0]]
-        lowest = min(lowest, float(found.min()))
+        misfits = misfit(np.stack([encodable[at] for encodable, at in columns], axis=1))
+        misfits = misfits.reshape(around.shape[:2])
+        best = np.arange(len(around)), misfits.argmin(axis=1)
+        places = around[best][misfits[best] < (1 - _LEAST) * misfits[:, 0]]
+        lowest = min(lowest, float(misfits.min()))
     return lowest
