@@ -21,7 +21,7 @@ from biogrip_study.records.identifications import (
     identification_columns,
     read_identifications,
 )
-from biogrip_study.stages.identification import identify_batch
+from biogrip_study.stages.identification import identify_seeds
 from biogrip_study.stages.targets import measure, simulate_target
 from biogrip_study.tables.layout import Column, ShownTable, write
 from tests.helpers.default import STUDY, seen, study_of
@@ -338,7 +338,7 @@ def test_one_that_changes_nothing_finds_what_the_study_finds(tmp_path: Path) -> 
     case = study.case(CASE)
     simulate_target(case, target)
     measure(case, range(3), target, measured)
-    identify_batch(case, "genetic", range(3), measured, [], ours_file, tmp_path / "h.npz")
+    identify_seeds(case, "genetic", range(3), measured, [], ours_file, tmp_path / "h.npz")
     (tmp_path / CASE).mkdir()
     files = [tmp_path / CASE / f"{name}.csv" for name in study.config.readings]
     for file in files:

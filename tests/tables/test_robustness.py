@@ -23,7 +23,7 @@ sweeps:
     cases: [endothelial_cell]
     rows:
       {label: level, unit: "%", unit_in_si: 0.01, key: measurement.noise.level, values: [0, 0.2]}
-    identification_columns:
+    columns:
       label: kind
       key: measurement.noise
       values:

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from biogrip.config.source import overlaid
-from tests.helpers.runs import TINY, clone, dry_run, jobs_of, planned, results_of, snakemake
+from tests.helpers.runs import SMALL, TINY, clone, dry_run, jobs_of, planned, results_of, snakemake
 
 # What puts all cases together, whatever changed, and what compares their identifications.
 TOLD = {"claims": 1, "page": 1}
@@ -79,7 +79,7 @@ def test_what_uses_a_setting_runs_again_and_nothing_else(tiny: Path, name: str) 
 def test_a_table_and_a_figure_take_the_jobs_whose_files_they_need(tmp_path: Path) -> None:
     """Of one sample and two methods: no intervals, no models, no verdicts."""
     identified = {"target": 1, "measurement": 1, "identification": 2, "case_tables": 1}
-    config = TINY | {"only": ["liquid_drop_2"]}
+    config = SMALL | {"only": ["liquid_drop_2"]}
     for target, rule in (("tables/errors.csv", "errors"), ("figures/moduli.png", "moduli")):
         assert planned(tmp_path, f"results/{target}", config=config) == {**identified, rule: 1}
 

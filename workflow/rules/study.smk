@@ -91,7 +91,7 @@ rule identification:
     params:
         **settings_of("study_seed", "actuator", *FIT),
         method=lambda wildcards: settings(STUDY, [METHODS[wildcards.method].key], wildcards.case),
-        stages=["biogrip_study.stages.identification.identify_batch"],
+        stages=["biogrip_study.stages.identification.identify_seeds"],
     message:
         "Identifying {wildcards.case} by {wildcards.method}, {wildcards.batch}"
     script:

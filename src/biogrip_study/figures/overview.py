@@ -167,7 +167,7 @@ def _device(axes: Axes) -> None:
 NEAR = 0.1
 """Relative spread of nine tenths of the fits below which the experiment determines a modulus."""
 
-_FREQUENCIES = 121
+_MODULI_DRAWN = 121
 _PANEL_LETTERS = 28
 _STYLES: tuple[dict[str, Any], ...] = (
     *({"color": colour} for colour in (style.BLUE, style.ORANGE, style.GREEN)),
@@ -211,7 +211,7 @@ def _draw_moduli_of_case(
     """Draw G' and G'' of all fits and of the truth, and shade where the fits agree."""
     between = np.diff(time_s)
     slowest, fastest = 1 / (time_s[-1] - time_s[0]), 1 / float(np.min(between))
-    omega = np.geomspace(slowest / 30, 30 * fastest, _FREQUENCIES)
+    omega = np.geomspace(slowest / 30, 30 * fastest, _MODULI_DRAWN)
     model = case.experiment.model
     near = []
     for method in {m.name: m for m in (study.shown_method, study.fitting_method)}.values():

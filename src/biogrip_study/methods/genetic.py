@@ -25,7 +25,7 @@ from biogrip.keys import Block, Complaint
 from biogrip_study.methods.genome import Chromosomes, Genome, make_genome
 from biogrip_study.methods.misfit import make_misfits
 
-_MOST = 1_000_000
+_LARGEST_SETTING = 1_000_000
 
 Ranking = NDArray[np.float32]
 """Misfits by which individuals are ranked, (n_populations, n)."""
@@ -35,9 +35,9 @@ Ranking = NDArray[np.float32]
 class GeneticSettings(Block):
     """Settings of the genetic algorithm (section 4)."""
 
-    population: Annotated[int, Field(ge=4, le=_MOST)]
+    population: Annotated[int, Field(ge=4, le=_LARGEST_SETTING)]
     """Individuals in a generation."""
-    survivors: Annotated[int, Field(ge=2, le=_MOST)]
+    survivors: Annotated[int, Field(ge=2, le=_LARGEST_SETTING)]
     """Number of the best, which survive unchanged and are the parents of the others."""
     mating: Literal["pairs", "rank"]
     """`pairs`: survivors form random disjoint pairs; `rank`: parents are drawn with a probability
@@ -45,17 +45,17 @@ class GeneticSettings(Block):
     cut: Literal["once", "between", "each"]
     """`once`: one crossover cut, anywhere; `between`: one, between parameters; `each`: one in every
     parameter."""
-    mutation_start: Annotated[int, Field(ge=1, le=_MOST)]
+    mutation_start: Annotated[int, Field(ge=1, le=_LARGEST_SETTING)]
     """First generation whose children mutate."""
     mutation_probability: Annotated[float, Field(ge=0, le=1)]
     """Share of the children that mutate."""
     mutated_genes: Annotated[int, Field(ge=1, le=50)]
     """Number of times that a gene of such a child is chosen and redrawn from its range."""
-    patience: Annotated[int, Field(ge=1, le=_MOST)]
+    patience: Annotated[int, Field(ge=1, le=_LARGEST_SETTING)]
     """Stop after this number of generations without improvement of the best misfit."""
-    min_generations: Annotated[int, Field(ge=0, le=_MOST)]
+    min_generations: Annotated[int, Field(ge=0, le=_LARGEST_SETTING)]
     """Fewest generations."""
-    max_generations: Annotated[int, Field(ge=1, le=_MOST)]
+    max_generations: Annotated[int, Field(ge=1, le=_LARGEST_SETTING)]
     """Most generations."""
     mutants: Literal["children", "all"] = "children"
     """Individuals that may mutate: `children`; or `all`, survivors except the best, too."""

@@ -119,7 +119,7 @@ def write_report(
     ]
     shown = {
         "sliders": _sliders(study, measurements),
-        **_said(study, judged, downloads),
+        **_answered(study, judged, downloads),
         "cases": judged,
         **_placed(study, drawn, owners),
         **_tables_placed(study, listed),
@@ -127,7 +127,7 @@ def write_report(
         "config": yaml.safe_dump(
             {key: value for key, value in study.plain.items() if key != "pdf"}, allow_unicode=True
         ),
-        "title": _QUESTION if study.published else _names([*titles.values()]),
+        "title": _QUESTION if study.published else _named_together([*titles.values()]),
         "paper": bool(study.published),
         "versions": {"biogrip": __version__, **{name: version(name) for name in _LIBRARIES}},
     }
@@ -135,7 +135,7 @@ def write_report(
         write_text(file, TEMPLATES.get_template(f"{template}.html.j2").render(shown))
 
 
-def _names(titles: Sequence[str]) -> str:
+def _named_together(titles: Sequence[str]) -> str:
     return ", ".join(titles) if len(titles) <= _MOST_TITLES else f"{len(titles)} samples"
 
 
@@ -148,7 +148,7 @@ def _sliders(study: Study, measurements: Sequence[Path]) -> dict[str, Any] | Non
     return slid(*movable[0]) if movable else None
 
 
-def _said(
+def _answered(
     study: Study, judged: Sequence[tuple[Case, Mapping[str, Any]]], downloads: Sequence[Path]
 ) -> dict[str, Any]:
     """Return the answers, and results beside the paper's or the truth."""

@@ -130,16 +130,16 @@ def history_of(method: str, seed: int, experiment: Experiment, answer: Fit) -> d
 
 def read_identifications(path: Path, case: Case, method: str | None = None) -> "pd.DataFrame":
     """Read identifications of a case by all methods of the study, or by one, in all seeds."""
-    frame = _read_rows(path, case, case.study.config.methods, range(case.seeds))
+    frame = _read_methods(path, case, case.study.config.methods, range(case.seeds))
     return frame if method is None else frame[frame["method"] == method].reset_index(drop=True)
 
 
 def read_batch(path: Path, case: Case) -> "pd.DataFrame":
     """Read identifications by the method and in the seeds that the path of a batch names."""
-    return _read_rows(path, case, [path.parent.name], seeds_of(path.stem))
+    return _read_methods(path, case, [path.parent.name], seeds_of(path.stem))
 
 
-def _read_rows(path: Path, case: Case, methods: Sequence[str], seeds: range) -> "pd.DataFrame":
+def _read_methods(path: Path, case: Case, methods: Sequence[str], seeds: range) -> "pd.DataFrame":
     file = RowFile(
         "identifications",
         identification_columns(case.sample.model),

@@ -1,6 +1,6 @@
 """Identification of the sample in noisy traces: by a method, and with every sample model.
 
-A job has a batch of the seeds of a case. `identify_batch` writes what a method finds in each trace,
+A job has a batch of the seeds of a case. `identify_seeds` writes what a method finds in each trace,
 with the history of its search; `join` puts the batches of a case together, a row per method and
 seed, with what the genes could have held of each trace. `fit` writes the misfits of all sample
 models, for model selection. Traces are fitted in groups, which are small enough for little memory;
@@ -43,7 +43,7 @@ def seed_groups(seeds: Sequence[int], times: int = 1) -> Iterator[Sequence[int]]
     return (seeds[some] for some in parts(len(seeds), times * _JOINT))
 
 
-def identify_batch(
+def identify_seeds(
     case: Case,
     method: str,
     seeds: Sequence[int],
