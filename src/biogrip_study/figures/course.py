@@ -10,7 +10,6 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patheffects import withStroke
 from matplotlib.ticker import LogLocator, MaxNLocator
 
 from biogrip.arrays import Array
@@ -84,10 +83,11 @@ def draw_convergence(case: Case, identifications: Path, history: Path) -> Figure
     label = "noise in the trace" if noisy else "lowest misfit"
     axes.axhline(0, color=style.TARGET, linestyle="--", linewidth=0.8, label=label)
     last = int(histories["generation"].max())
-    if method.name == "genetic":
-        mutation_start = case.block.method("genetic").mutation_start
-        if mutation_start <= last:
-            _mark_mutation(axes, mutation_start, last)
+    start = case.block.method("genetic").mutation_start
+    if method.name == "genetic" and start <= last:
+        axes.axvline(
+            start, color=style.TARGET, linestyle=":", linewidth=0.8, label="mutation starts"
+        )
     axes.set_yscale("symlog", linthresh=1, linscale=0.5)
     axes.set_ylim(bottom=-0.8)
     ticks = [tick for tick in _TICKS if tick < axes.get_ylim()[1]]
@@ -102,21 +102,6 @@ def draw_convergence(case: Case, identifications: Path, history: Path) -> Figure
         axes.set_title(f"{case.title}: {reached} of {len(identified)} {words}")
     drawn.legend(loc="outside lower center", ncols=2)
     return drawn
-
-
-def _mark_mutation(axes: Axes, start: int, last: int) -> None:
-    axes.axvline(start, color=style.TARGET, linestyle=":", linewidth=0.8)
-    before = start > last / 2
-    axes.annotate(
-        "mutation starts",
-        (start, 0.03),
-        xycoords=("data", "axes fraction"),
-        xytext=(-3 if before else 3, 0),
-        textcoords="offset points",
-        ha="right" if before else "left",
-        fontsize=7,
-        path_effects=[withStroke(linewidth=2, foreground="white")],
-    )
 
 
 def draw_evolution(case: Case, identifications: Path, history: Path) -> Figure:

@@ -100,15 +100,13 @@ def error_percent(target: float | None, identified: Array) -> Array:
 
 def _of_paper(case: Case, names: list[str], target: float | None) -> Row:
     """Return the paper's value and error; of a sum, what its members' printed errors make them."""
-    told = value_in_case(case, names)
+    told, printed = value_in_case(case, names), case.published
     if told is None:
         return {}
-    if len(names) > 1:
-        error = error_percent(target, np.array(told[:1]))[0]
-        return {"paper_identified": told[0], "paper_error_percent": error}
-    (name,) = names
-    error = case.published.error_percent.get(name)
-    return {"paper_identified": case.published.identified[name], "paper_error_percent": error}
+    value, error = told[0], error_percent(target, np.array(told[:1]))[0]
+    if len(names) == 1:
+        value, error = printed.identified[names[0]], printed.error_percent.get(names[0])
+    return {"paper_identified": value, "paper_error_percent": error}
 
 
 def errors(study: Study, identifications: list[Path]) -> ShownTable:
