@@ -13,7 +13,7 @@ from biogrip.command import files as command
 from biogrip.command.files import identify_batch
 from biogrip.command.options import Setting
 from biogrip.command.outputs import Outcome
-from biogrip.command.page import beyond, common, draw_traces, write_page
+from biogrip.command.page import beyond, common, draw_every_trace, write_page
 from biogrip.command.settings import Asked
 from biogrip.command.words import columns_of, for_a_paper
 from tests.helpers.identified import write_drop
@@ -93,7 +93,7 @@ def test_the_figure_is_by_the_words_of_the_table(dish: Outcome) -> None:
         each["trace"]: {"day": f"{number % 4}", "drug": "ab"[number % 2], "size": f"{number}"}
         for number, each in enumerate(dish.found)
     }
-    drawn, said = draw_traces(replace(dish, copied=words), columns_of(dish.found))
+    drawn, said = draw_every_trace(replace(dish, copied=words), columns_of(dish.found))
     assert said == "Groups: drug. Large marks: means of each day."
     axes = drawn.axes[0]
     assert [label.get_text() for label in axes.get_xticklabels()] == ["a", "b"]
@@ -104,11 +104,13 @@ def test_the_figure_is_by_the_words_of_the_table(dish: Outcome) -> None:
     assert sum(line.get_markerfacecolor() == "white" for line in points) == 1
     # By units the chance is another one than by cells.
     by_cell = {name: {"drug": own["drug"]} for name, own in words.items()}
-    others = draw_traces(replace(dish, copied=by_cell), columns_of(dish.found))[0].axes[0].texts
+    others = (
+        draw_every_trace(replace(dish, copied=by_cell), columns_of(dish.found))[0].axes[0].texts
+    )
     assert [it.get_text() for it in axes.texts] != [it.get_text() for it in others]
     words[dish.found[0]["trace"]] = {"other": "of another table"}
-    assert draw_traces(replace(dish, copied=words), columns_of(dish.found))[0].axes
-    drawn, said = draw_traces(dish, columns_of(dish.found))
+    assert draw_every_trace(replace(dish, copied=words), columns_of(dish.found))[0].axes
+    drawn, said = draw_every_trace(dish, columns_of(dish.found))
     assert said == "Cells are taken for independent."
     assert [label.get_text() for label in drawn.axes[0].get_xticklabels()] == ["all traces"]
 

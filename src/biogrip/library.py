@@ -110,9 +110,9 @@ class TraceResult:
         """
         import pandas as pd
 
-        found = self.diagnosis.without_model(at)
+        level = self.diagnosis.without_model(at)
         columns = ["quantity", "at_s", "unit", "value", "low", "high"]
-        frame = pd.DataFrame(found.told)[columns]
+        frame = pd.DataFrame(level.told)[columns]
         return frame.astype(dict.fromkeys(["at_s", "value", "low", "high"], float))
 
     def refit(self, **changed: Any) -> "TraceResult":
@@ -200,7 +200,7 @@ def identify_trace(
     """
     arguments = locals()
     for name, block in (("fixed", fixed or {}), ("config", config or {})):
-        if not isinstance(block, Mapping) or not all(isinstance(it, str) for it in block):
+        if not isinstance(block, Mapping) or not all(isinstance(value, str) for value in block):
             raise BiogripError(f"{name}: found {block!r:.40}, allowed are values by name.")
     if not isinstance(reads, str) or reads not in INSTRUMENTS:
         raise BiogripError(f"reads: found '{reads}', allowed are {', '.join(INSTRUMENTS)}.")
@@ -208,11 +208,13 @@ def identify_trace(
     axis = "omega_rad_per_s" if INSTRUMENTS[reads].sweeps else "time_s"
     beside = f"loss in {INSTRUMENTS[reads].read.unit}"
     more = {beside: loss, "sd": sd}
-    given = {axis: time_s, column: readings} | {n: it for n, it in more.items() if it is not None}
+    given = {axis: time_s, column: readings} | {
+        n: value for n, value in more.items() if value is not None
+    }
     columns = {name: as_column(values, name) for name, values in given.items()}
     if len({len(values) for values in columns.values()}) > 1:
-        found = " and ".join(f"{len(values)} of {name}" for name, values in columns.items())
-        raise BiogripError(f"found {found}; allowed are as many of each.")
+        lengths = " and ".join(f"{len(values)} of {name}" for name, values in columns.items())
+        raise BiogripError(f"found {lengths}; allowed are as many of each.")
     onset = ("fit_start", True) if isinstance(start, str) and start == "fit" else ("start_s", start)
     chosen: list[tuple[str, str, Any]] = [
         *(("config", block, value) for block, value in (config or {}).items()),
@@ -229,7 +231,9 @@ def identify_trace(
         ("drift", "measurement.drift", drift),
         ("fixed", "fixed", fixed and {**fixed}),
     ]
-    settings = [Setting(by, tuple(key.split(".")), it) for by, key, it in chosen if it is not None]
+    settings = [
+        Setting(by, tuple(key.split(".")), value) for by, key, value in chosen if value is not None
+    ]
     asked = Asked(Path("trace"), None, tuple(settings), "arguments", arrays=(*columns.values(),))
     try:
         recording, case = read_trace(asked)
@@ -253,10 +257,10 @@ def to_table(
 
     named = results
     if not isinstance(named, Mapping):
-        named = {str(number): own for number, own in enumerate(named, start=1)}
-    found = [{**own.data, "trace": name} for name, own in named.items()]
+        named = {str(number): result for number, result in enumerate(named, start=1)}
+    outcomes = [{**result.data, "trace": name} for name, result in named.items()]
     copied = {name: (words or {}).get(name, {}) for name in named}
-    header, rows = table_of(Outcome(found, {}, copied=copied))
+    header, rows = table_of(Outcome(outcomes, {}, copied=copied))
     return pd.DataFrame(rows, columns=header)
 
 

@@ -65,12 +65,11 @@ def identify_alike(
     *,
     progress: ReportProgress = silent,
     doing: Callable[[str], None] = lambda step: None,
-    valley: bool = False,
 ) -> list[Diagnosis]:
     """Identify prepared traces of the same `budget`, each as if it were alone.
 
-    `doing` is told of each of the `STEPS`. If `valley` is true, chi^2 is mapped over exchangeable
-    parameters. A `BiogripError` says that one of the traces cannot be fitted.
+    `doing` is told of each of the `STEPS`. A `BiogripError` says that one of the traces cannot be
+    fitted.
     """
     experiments = [experiment for _, experiment in traces]
     first, count = experiments[0], sum(len(recording.time_s) for recording, _ in traces)
@@ -81,13 +80,12 @@ def identify_alike(
         [fit.problem for fit in fits],
         [fit.found for fit in fits],
         confidence=first.confidence,
-        valley=valley,
     )
     if not first.simulated:
         doing("trying other sample models")
         models = models_tried(traces, fits, judged)
         judged = [
-            replace(judge_again(fit, own, tried, valley=valley), models=tried)
+            replace(judge_again(fit, own, tried), models=tried)
             for fit, own, tried in zip(fits, judged, models, strict=True)
         ]
         judged = with_times(judged)
