@@ -1,5 +1,6 @@
 """A diagnosis as plain data in SI units: what JSON files, tables and pages have of it."""
 
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -37,11 +38,7 @@ def judged_data(diagnosis: Diagnosis) -> dict[str, Any]:
         "threshold": likelihood.threshold,
         "certainty": likelihood.certainty,
         "quantities": [_finding(each, rejected=rejected) for each in diagnosis.findings],
-        "hidden": [
-            {"words": each.words(), "moves": each.moves}
-            for each in diagnosis.hidden
-            if each.beyond[1] > 1
-        ],
+        "moves": [asdict(move) for move in diagnosis.moves],
         "trades": [
             {
                 "members": list(trade.members),

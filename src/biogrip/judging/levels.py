@@ -72,10 +72,6 @@ PERIODS, EVEN = 10, 0.01
 """Fewest periods of a line, as what is slower may be misfit, and the largest difference of
 intervals, as a share, with which it has a spectrum. Chosen."""
 
-JUMP, GAIN, BRANCH = 0.2, 0.2, 0.5
-"""Largest errors that a trace may well hide: a fifth of the peak, or of the readings; half of the
-stiffness of the first branch. Chosen."""
-
 # The start of a protocol.
 
 SURELY, AS_GOOD = 1e-9, 1e-3

@@ -37,7 +37,7 @@ from biogrip.judging.profiles import Profile, compute_profiles
 from biogrip.judging.verdicts import Finding
 from biogrip.physics.modes import lag_course
 from biogrip.physics.noise import estimate_noise, nuisance_basis, without
-from biogrip.physics.protocol import ramp
+from biogrip.physics.protocol import ramp, spacing_at
 
 _LAGS_A_DECADE = 2
 # Delays on the first grid; finer ones have as many between the neighbours of the best.
@@ -129,12 +129,6 @@ class OnsetFit:
     """Sample parameters, (n_parameters,)."""
     misfit: float
     """RMS misfit."""
-
-
-def spacing_at(time_s: Array, at_s: float) -> float:
-    """Return how far ascending times, (n,), are apart at one of them, or nearest to it, in s."""
-    after = int(np.clip(np.searchsorted(time_s, at_s), 1, len(time_s) - 1))
-    return float(time_s[after] - time_s[after - 1])
 
 
 @dataclass(frozen=True)
