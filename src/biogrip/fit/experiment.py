@@ -73,6 +73,8 @@ class Experiment:
     record: Array | None = field(default=None, compare=False)
     """Times from the start and what was controlled at them, (n, 2), where that was recorded, see
     `biogrip.physics.protocol`; the phases are then a hold as long and as high."""
+    load_errors: Array | None = field(default=None, compare=False)
+    """Errors of the record that smoothing leaves, drawn at random, (n_drawn, n)."""
     undeclared: frozenset[str] = frozenset()
     """Which of ``offset`` and ``drift`` nothing is said of: a noise model brings them along."""
     given_ranges: frozenset[str] = frozenset()
@@ -102,7 +104,8 @@ class Experiment:
         if self.instrument.sweeps:
             return SWEEP
         if self.record is not None:
-            return follow_rows(*self.record.T, deforms=self.instrument.deforms)
+            course = follow_rows(*self.record.T, deforms=self.instrument.deforms)
+            return replace(course, smoothed=self.load_errors is not None)
         return join_phases(self.phases, deforms=self.instrument.deforms)
 
     @cached_property
@@ -125,7 +128,7 @@ class Experiment:
         """Leave out noise model, gripper uncertainty, and ranges neither it nor `others` use."""
         chosen = {p.range_name for model in (self.model, *others) for p in model.parameters}
         ranges = {name: genes for name, genes in self.ranges.items() if name in chosen}
-        return replace(self, ranges=ranges, coloured=False, uncertainty={})
+        return replace(self, ranges=ranges, coloured=False, uncertainty={}, load_errors=None)
 
     def weighted(self, sd: Array | None, *, known: bool = True) -> "Experiment":
         """Divide the readings of a trace by their standard deviations, if these are known.
@@ -171,7 +174,7 @@ class Experiment:
     @property
     def plain(self) -> bool:
         """True if noise is assumed to be white, and gripper and protocol to be known exactly."""
-        return not (self.coloured or self.uncertain)
+        return not (self.coloured or self.uncertain or self.load_errors is not None)
 
     def calibrated(self, files: Sequence[Path]) -> "Experiment":
         """Take the arms of the first calibration file; a bad one is a `BiogripError`."""

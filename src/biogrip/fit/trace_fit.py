@@ -16,7 +16,12 @@ from biogrip.digits import counted, rounded
 from biogrip.fit.experiment import Experiment, pose
 from biogrip.fit.least_squares import fit_from, identify_many
 from biogrip.fit.nested_fits import deepen
-from biogrip.fit.noise_model_fit import NoiseModelLikelihood, growth_left, outliers_of
+from biogrip.fit.noise_model_fit import (
+    NoiseModelLikelihood,
+    absorbed,
+    growth_left,
+    outliers_of,
+)
 from biogrip.fit.problem import Fit, Progress, TraceProblem, silent
 from biogrip.physics.noise import NoiseModel, drift_is_flow
 from biogrip.physics.simulation import simulated_response
@@ -65,6 +70,29 @@ def gripper_functions(experiment: Experiment, time_s: Array, parameters: Array) 
     )
     second = 0.5 * (above + below) - rotation()
     return np.vstack((0.5 * (above - below), _SECOND_ORDER * second))
+
+
+def load_functions(
+    experiment: Experiment, time_s: Array, parameters: Array, sensitivity: Array
+) -> Array:
+    """Compute what errors of a smoothed load add to readings, as far as it moves parameters.
+
+    They are drawn courses, whose responses in the directions of the parameters' slopes,
+    (n_parameters, n_times), have a covariance. Rows are functions with the same, (n, n_times).
+    """
+    if experiment.load_errors is None:
+        return sensitivity[:0]
+    assert experiment.record is not None
+    network, times_s = experiment.searched.network(parameters), experiment.record[:, 0]
+    shown = []
+    for errors in experiment.load_errors:
+        course = replace(experiment, record=np.column_stack((times_s, errors))).torque
+        given = experiment.gripper, network, course, time_s
+        shown.append(simulated_response(*given, nonlinear=False)[0])
+    weights = 1.0 if experiment.sd is None else experiment.sd / np.sqrt(np.mean(experiment.sd**2))
+    basis = absorbed(sensitivity)
+    triangle = np.linalg.qr(np.array(shown) / weights @ basis.T, mode="r")
+    return weights * (triangle @ basis) / np.sqrt(len(shown))
 
 
 _ROUNDS = 5
@@ -220,7 +248,12 @@ def _in_turn(
     for _ in range(_ROUNDS):
         start = np.log(found.parameters)
         residual, sensitivity = plain.residuals(start)
-        uncertain = gripper_functions(experiment, time_s, found.parameters)
+        uncertain = np.vstack(
+            (
+                gripper_functions(experiment, time_s, found.parameters),
+                load_functions(experiment, time_s, found.parameters, sensitivity),
+            )
+        )
         left = problem.residuals.free - len(found.parameters)
         noise_sd = experiment.noise_sd or found.misfit * np.sqrt(len(time_s) / left)
         before: NoiseModel | None = noise_model

@@ -132,11 +132,17 @@ def _what_limits_include(experiment: Experiment) -> str:
     said = []
     if instrument.has_jaws and keys:
         said.append(f"Limits include uncertainties of the gripper: {', '.join(keys)}.")
-    if steps := len(experiment.uncertainty.get("steps", {})):
-        said.append(
-            f"Limits allow for {counted(steps, 'step')} of the {controlled} anywhere between the "
-            f"two rows of its record; otherwise the {exact} is taken as exact."
+    steps, allowed = len(experiment.uncertainty.get("steps", {})), []
+    if steps:
+        allowed.append(
+            f"{counted(steps, 'step')} of the {controlled} anywhere between the two rows of its "
+            "record"
         )
+    if experiment.load_errors is not None:
+        allowed.append(f"what is left of noise in the record of the {controlled}")
+    if allowed:
+        text = f"Limits allow for {' and for '.join(allowed)}"
+        said.append(f"{text}; otherwise the {exact} is taken as exact.")
     return " ".join(said) or f"Limits are statistical only: the {exact} is taken as exact."
 
 

@@ -117,10 +117,10 @@ class _Left:
     def lines(self) -> list[str]:
         """Sentence on lines in the spectrum, if there is no other misfit.
 
-        Outliers have all frequencies, and sweeps none.
+        Outliers have all frequencies, and sweeps none. What a smoothed load leaves has its own.
         """
         residuals = self.likelihood.problem.residuals
-        if residuals.course.sweeps or self.struck.any():
+        if residuals.course.sweeps or residuals.course.smoothed or self.struck.any():
             return []
         rest, taken, named = self.bulk, self.basis, list[str]()
         unit, slowest = f" {residuals.instrument.read.unit}".rstrip(), np.inf

@@ -95,6 +95,12 @@ which their growth is known, and its powers of the time if someone spaced them. 
 HELD = 0.1
 """Change of a recorded load, as a share of it, that is held. Chosen."""
 
+NO_LOAD = 0.01
+"""Share of the largest load up to which rows tell the zero: they show hardly more of it. Chosen."""
+
+FEWEST_STILL = 8
+"""Rows of a record from which on a trend is told: of fewer, an arc at a sine's crest is none."""
+
 SHORT_RAMP = 0.1
 """Share of the trace up to which a ramp before it may pass for a step. Chosen."""
 

@@ -6,7 +6,7 @@ rotation jumps between two readings, the misfit as a function of the onset has a
 it is minimised between neighbouring ones, from one interval to the next.
 
 `notes_on_start` tests if a trace begins before its protocol, or so long after it that the clock may
-be another's; it says what a tare would change, and a ramp before the first reading.
+be another's; it says what a ramp before the first reading would change.
 
 `profile_over_onset` takes the lowest of the profiles for single onsets, each in its increase over
 the best fit with the best onset. Onsets are taken all over their own confidence interval, closer at
@@ -20,7 +20,7 @@ from functools import cached_property, partial
 from itertools import pairwise
 
 import numpy as np
-from scipy.special import chdtri, stdtrit
+from scipy.special import chdtri
 
 from biogrip.arrays import Array, IntArray, parts
 from biogrip.digits import instant, plain
@@ -263,7 +263,7 @@ def notes_on_start(
     readings: Array,
     diagnosis: Diagnosis,
 ) -> list[Note]:
-    """Return notes on another start of the protocol than at 0, on a tare, and on a hidden ramp.
+    """Return notes on another start of the protocol than at 0, and on a ramp.
 
     A trace that begins constant, and fits far better with a later start, tells nothing of the
     sample under the protocol as given, whatever noise model absorbs the misfit: the test is a
@@ -275,19 +275,18 @@ def notes_on_start(
     notes: list[Note] = []
     if may_be_late and ramped and is_cut_off(time_s):
         notes += _about_clock(fits, diagnosis)
-    elif begins_constant(time_s, readings):
+    elif may_be_late and begins_constant(time_s, readings):
         # A constant that is not zero is an offset, with which the onset would be biased.
-        free, onset_s = replace(experiment, offset=True), 0.0
-        if may_be_late or experiment.fit_start:
-            onset_s = estimate_onset(experiment, time_s, readings)
+        free, onset_s = (
+            replace(experiment, offset=True),
+            estimate_onset(experiment, time_s, readings),
+        )
         if begins_constant(time_s, readings, onset_s):
-            if may_be_late:
-                notes += _about_late_onset(replace(fits, experiment=free), diagnosis, onset_s)
-            if not experiment.offset and (notes or not may_be_late):
-                notes += _about_tare(fits, diagnosis, onset_s)
+            notes += _about_late_onset(replace(fits, experiment=free), diagnosis, onset_s)
     if diagnosis.status != REJECTED and ramped and not notes:
         notes += _about_ramp(fits, diagnosis, ramped)
     smooth = experiment.record is not None and not experiment.uncertainty.get("steps")
+    smooth &= experiment.load_errors is None
     if smooth and not experiment.coloured and len(time_s) <= MANY:
         notes += _about_load(fits, diagnosis)
     return notes
@@ -316,19 +315,6 @@ def _about_late_onset(fits: OnsetFits, diagnosis: Diagnosis, guess_s: float) -> 
         "(measurement.fit_start), which allows for its uncertainty, or when it was, if that is "
         "known (--start, measurement.start_s).",
     )
-
-
-def _about_tare(fits: OnsetFits, diagnosis: Diagnosis, onset_s: float) -> Iterator[Note]:
-    """Yield a note if the readings before an onset are not zero, by a t test."""
-    before = fits.readings[fits.time_s < onset_s][:-1]
-    mean, error = float(np.mean(before)), float(np.std(before, ddof=1)) / np.sqrt(len(before))
-    if abs(mean) > error * stdtrit(len(before) - 1, 1 - levels.AS_GOOD / 2):
-        unit = f" {fits.experiment.instrument.read.unit}".rstrip()
-        yield Note(
-            REJECTION if diagnosis.status == REJECTED else DOUBT,
-            f"The {len(before)} readings before the start are constant, but {plain(mean)}{unit} "
-            "and not 0: if that is the zero of the instrument, say --offset (measurement.offset).",
-        )
 
 
 def _about_load(fits: OnsetFits, diagnosis: Diagnosis) -> Iterator[Note]:

@@ -7,7 +7,8 @@ fit's parameters move by
 
 to first order: a step of Gauss-Newton. J has the slopes of the response by the log-parameters in
 white noise of the standard deviation s; the s^2 is a prior of one e-fold, as in
-`Likelihood.deviation`. The XX No test is asked if it would see the error: who knows the instrument knows how large it is.
+`Likelihood.deviation`. Any linear sample is fitted again. No test is asked if it would see the
+error: who knows the instrument knows how large it is.
 """
 
 import math

@@ -76,6 +76,18 @@ def correlated(residual: Array, basis: Array) -> tuple[float, float]:
     return 1 - observed * free / first, chance
 
 
+def is_still(values: Array) -> bool:
+    """Return True if values only scatter about their mean, (n,): neither rise nor wander.
+
+    Of too few no trend is told, unless they are all the same.
+    """
+    if np.ptp(values) == 0:
+        return True
+    apart, basis = values - np.mean(values), np.full((1, len(values)), len(values) ** -0.5)
+    chances = correlated(apart, basis)[1], wandering(apart, basis)
+    return len(values) >= levels.FEWEST_STILL and min(chances) >= levels.FALSE_ALARM
+
+
 def wandering(residual: Array, basis: Array) -> float:
     """Return the chance of means over stretches of white noise that scatter as much.
 

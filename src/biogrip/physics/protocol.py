@@ -75,6 +75,8 @@ class Course:
     """End of the protocol."""
     deforms: bool = False
     """True if a deformation is controlled, and the load is read: relaxation."""
+    smoothed: bool = False
+    """True if noise was smoothed out of a record, of which something may be left."""
     sweeps: ClassVar[bool] = False
     """True if it is a `Sweep`, whose readings do not follow one another in time."""
 
@@ -278,16 +280,17 @@ _SMOOTH, _STRAIGHT = 0.25, 0.1
 _ABRUPT, _STEP_OF_EXTENT = 8.0, 0.01
 
 
-def with_steps(record: Array) -> tuple[Array, Array]:
+def with_steps(record: Array, least: float = 0.0) -> tuple[Array, Array]:
     """Return a record, (n, 2), with a step in the middle of each two rows between which one came.
 
-    A step is two rows of one time. Also returned are standard deviations of their times in s,
-    (n_steps,), which are anywhere between the rows.
+    A step is two rows of one time, and not smaller than the least. Also returned are standard
+    deviations of their times in s, (n_steps,), which are anywhere between the rows.
     """
     time_s, values = record.T
     sizes = np.pad(np.abs(np.diff(values)), _ASIDE)
     around = [np.roll(sizes, by) for by in (-2, -1, 1, 2)]
-    abrupt = sizes > np.maximum(_ABRUPT * np.max(around, axis=0), _STEP_OF_EXTENT * np.ptp(values))
+    least = max(least, _STEP_OF_EXTENT * float(np.ptp(values)))
+    abrupt = sizes > np.maximum(_ABRUPT * np.max(around, axis=0), least)
     before = np.flatnonzero(abrupt[_ASIDE:-_ASIDE])
     middle_s = 0.5 * (time_s[before] + time_s[before + 1])
     steps = np.stack((np.repeat(middle_s, 2), np.ravel(values[before[:, None] + [0, 1]])), axis=1)

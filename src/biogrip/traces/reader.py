@@ -128,8 +128,7 @@ class Recording:
         if self.load_noise:
             said.append(
                 f"Smoothed out of {self.read.load}, since the readings do not follow it: what "
-                f"scatters from row to row by {plain(100 * self.load_noise, 2)} % of the largest. "
-                "What is left counts as exact."
+                f"scatters from row to row by {plain(100 * self.load_noise, 2)} % of the largest."
             )
         if "unclear" in form:
             said.append(
