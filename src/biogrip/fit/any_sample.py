@@ -160,7 +160,7 @@ class AnySampleFit:
         trace, own = self.lags.residuals.trace, self.amplitudes > 0
         shown = trace.condensed.cleared(self._shown(self.lags.residuals))
         residual: Array = trace.cleared - self.amplitudes[own] @ shown
-        return residual, absorbed(np.vstack((shown, trace.condensed.nuisance)))
+        return residual, absorbed(np.vstack((shown, trace.condensed.taken)))
 
     def response(self, residuals: Residuals) -> Array:
         """Return what it shows, (n_samples,), under the protocol and at the times of residuals."""

@@ -74,7 +74,8 @@ class Experiment:
     """Times from the start and what was controlled at them, (n, 2), where that was recorded, see
     `biogrip.physics.protocol`; the phases are then a hold as long and as high."""
     load_errors: Array | None = field(default=None, compare=False)
-    """Errors of the record that smoothing leaves, drawn at random, (n_drawn, n)."""
+    """Directions in which a record that was smoothed may be off, (n_directions, n), each as long as
+    its standard deviation."""
     undeclared: frozenset[str] = frozenset()
     """Which of ``offset`` and ``drift`` nothing is said of: a noise model brings them along."""
     given_ranges: frozenset[str] = frozenset()

@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from biogrip.arrays import Array, BoolArray
+from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.digits import counted, rounded
 from biogrip.fit.experiment import Experiment, pose
 from biogrip.fit.least_squares import fit_from, identify_many
@@ -24,6 +24,7 @@ from biogrip.fit.noise_model_fit import (
 )
 from biogrip.fit.problem import Fit, Progress, TraceProblem, silent
 from biogrip.physics.noise import NoiseModel, drift_is_flow
+from biogrip.physics.protocol import Phase, join_phases
 from biogrip.physics.simulation import simulated_response
 
 # Square of three standard uncertainties.
@@ -75,27 +76,80 @@ def gripper_functions(experiment: Experiment, time_s: Array, parameters: Array) 
 def load_functions(
     experiment: Experiment, time_s: Array, parameters: Array, sensitivity: Array
 ) -> Array:
-    """Compute what errors of a smoothed load add to readings, as far as it moves parameters.
+    """Compute what errors of a smoothed load add to readings, (n_functions, n_times).
 
-    They are drawn courses, whose responses in the directions of the parameters' slopes,
-    (n_parameters, n_times), have a covariance. Rows are functions with the same, (n, n_times).
+    Those that show most have functions of their own. Of the others that is told by which they move
+    parameters, with slopes (n_parameters, n_times): they hardly differ from noise otherwise.
     """
     if experiment.load_errors is None:
         return sensitivity[:0]
-    assert experiment.record is not None
-    network, times_s = experiment.searched.network(parameters), experiment.record[:, 0]
-    shown = []
-    for errors in experiment.load_errors:
-        course = replace(experiment, record=np.column_stack((times_s, errors))).torque
-        given = experiment.gripper, network, course, time_s
-        shown.append(simulated_response(*given, nonlinear=False)[0])
-    weights = 1.0 if experiment.sd is None else experiment.sd / np.sqrt(np.mean(experiment.sd**2))
+    shown = _shown_of_errors(experiment, time_s, parameters)
+    shown = shown[np.argsort(-np.linalg.norm(shown, axis=1), kind="stable")]
+    most, rest = np.split(shown, [_MOST_FUNCTIONS])
     basis = absorbed(sensitivity)
-    triangle = np.linalg.qr(np.array(shown) / weights @ basis.T, mode="r")
-    return weights * (triangle @ basis) / np.sqrt(len(shown))
+    return np.vstack((most, np.linalg.qr(rest @ basis.T, mode="r") @ basis))
+
+
+def noise_beside(residual: Array, functions: Array, free: int) -> float:
+    """Return the noise beside functions of random amplitude, (n_functions, n_samples).
+
+    With its standard deviation, chi^2 of the residual, (n_samples,), is its degrees of freedom.
+    """
+    from scipy.optimize import brentq
+
+    _, sizes, directions = np.linalg.svd(functions, full_matrices=False)
+    within = (directions @ residual) ** 2
+    rest = max(float(residual @ residual - within.sum()), 0.0)
+
+    def excess(log_sd: float) -> float:
+        variance = float(np.exp(2 * log_sd))
+        return float(np.sum(within / (variance + sizes**2))) + rest / variance - free
+
+    most = 0.5 * float(np.log(residual @ residual / free))
+    return float(np.exp(brentq(excess, most - _EFOLDS, most)))
+
+
+def _shown_of_errors(experiment: Experiment, time_s: Array, parameters: Array) -> Array:
+    """Return responses to the errors of a record, (n_directions, n_times).
+
+    Each is a sum of ramps from row to row, whose response is interpolated between lags.
+    """
+    assert experiment.record is not None
+    assert experiment.load_errors is not None
+    rows = _thinned(len(experiment.record))
+    row_s, errors = experiment.record[rows, 0], experiment.load_errors[:, rows]
+    # Nothing is there before the first row, and a step is a steep ramp.
+    least_s = _STEEP * float(np.median(np.diff(row_s)))
+    row_s = np.insert(row_s, 0, row_s[0] - least_s)
+    errors, lasts_s = np.pad(errors, ((0, 0), (1, 0))), np.maximum(np.diff(row_s), least_s)
+    slopes = np.diff(errors) / lasts_s
+    some_s = time_s[_thinned(len(time_s))]
+    longest_s = max(float(some_s[-1] - row_s[0]), float(lasts_s.sum()))
+    lags_s = np.append(0.0, np.geomspace(least_s, longest_s, _LAGS))
+    phases = (Phase(2 * longest_s, 0.0, 1.0),)
+    course = join_phases(phases, deforms=experiment.instrument.deforms)
+    network = experiment.searched.network(parameters)
+    given = experiment.gripper, network, course, lags_s
+    of_ramp = simulated_response(*given, nonlinear=False)[0]
+    began, ended = (
+        np.interp(np.subtract.outer(some_s, at_s), lags_s, of_ramp)
+        for at_s in (row_s[:-1], row_s[:-1] + lasts_s)
+    )
+    shown = (began - ended) @ slopes.T
+    return np.array([np.interp(time_s, some_s, each) for each in shown.T])
+
+
+def _thinned(count: int) -> IntArray:
+    """Return places of at most so many rows, spread evenly."""
+    return np.unique(np.linspace(0, count - 1, min(count, _MOST_ROWS)).astype(np.int64))
 
 
 _ROUNDS = 5
+# Errors of a load with functions of their own; rows and readings that are looked at; lags of the
+# response to a ramp; how long a step lasts, over the time from row to row.
+_MOST_FUNCTIONS, _MOST_ROWS, _LAGS, _STEEP = 200, 3000, 1000, 1e-6
+# Most e-folds by which noise is smaller beside them.
+_EFOLDS = 12.0
 # Changes of noise shares and times below this change no confidence limit in its third digit.
 _CONVERGED = 1e-2
 # The same of a fit that moves by less, in standard deviations.
@@ -248,14 +302,13 @@ def _in_turn(
     for _ in range(_ROUNDS):
         start = np.log(found.parameters)
         residual, sensitivity = plain.residuals(start)
-        uncertain = np.vstack(
-            (
-                gripper_functions(experiment, time_s, found.parameters),
-                load_functions(experiment, time_s, found.parameters, sensitivity),
-            )
-        )
+        of_load = load_functions(experiment, time_s, found.parameters, sensitivity)
+        uncertain = gripper_functions(experiment, time_s, found.parameters)
+        uncertain = np.vstack((uncertain, of_load))
         left = problem.residuals.free - len(found.parameters)
         noise_sd = experiment.noise_sd or found.misfit * np.sqrt(len(time_s) / left)
+        if len(of_load) and experiment.noise_sd is None:
+            noise_sd = noise_beside(residual, of_load, left)
         before: NoiseModel | None = noise_model
         growing = plain.residuals.response(start) if grows else None
         if experiment.coloured:

@@ -10,8 +10,7 @@ course, given noise and weight, of which the likelihood is highest [2]_. Where r
 to steps, they are smoothed as far as what is left scatters no more than errors of rounding. Rows
 that change by far more than most others are no scatter: there one stretch ends and the next begins.
 
-What smoothing leaves uncertain is told by courses drawn at random from those that the rows allow
-for: drawn is what noise of data and of third differences would make of nothing.
+What that leaves uncertain are directions, in which the course is off by a random amount each.
 
 References
 ----------
@@ -42,8 +41,8 @@ from biogrip.traces.reader import Recording
 # Weights that are tried; change of a row over the median's that is no scatter; fewest rows.
 _WEIGHTS = 10.0 ** np.arange(-2, 13, 0.5)
 _FAR, _FEWEST = 8.0, 20
-# Courses that are drawn, whose scatter then tells a standard deviation to 9 %.
-_DRAWN = 64
+# Variance of a direction that is smoothed out, over that of one that is left; most numbers at once.
+_LEFT, _MOST_NUMBERS = 30.0, 20_000_000
 _LAGS_A_DECADE = 2
 # Most readings that are compared, and by how much χ² has to fall: by less than a tenth it does
 # where nothing is smoothed out, and if it hardly falls, both courses will do.
@@ -139,25 +138,31 @@ def _left(
 
 
 def smoothed(values: Array) -> tuple[Array, Array]:
-    """Return a course, (n,), without what scatters in its stretches, and errors, (n_drawn, n)."""
+    """Return a course, (n,), without what scatters in its stretches, and how it may be off.
+
+    It is off by directions, (n_directions, n), times independent standard normal numbers.
+    """
     changes, step = np.abs(np.diff(values)), measure_rounding(values)
     far = np.maximum(_FAR * np.median(changes), levels.ONE_STEP * step)
     ends = 1 + np.flatnonzero(changes > far)
-    found, errors = values.copy(), np.zeros((_DRAWN, len(values)))
-    rng = np.random.default_rng(0)
+    found, errors = values.copy(), [np.zeros((0, len(values)))]
     for first, last in pairwise([0, *ends.tolist(), len(values)]):
-        stretch, here = values[first:last], slice(first, last)
+        stretch, beside = values[first:last], ((0, 0), (first, len(values) - last))
         if is_still(stretch):
-            found[here] = np.mean(stretch)
-            sd = float(np.std(stretch)) / np.sqrt(last - first)
-            errors[:, here] = sd * rng.standard_normal((_DRAWN, 1))
+            found[first:last] = np.mean(stretch)
+            errors.append(np.pad(np.full((1, last - first), _error_of_mean(stretch)), beside))
         elif last - first >= _FEWEST:
-            found[here], errors[:, here] = _graduated(stretch, step, rng)
-    return found, errors
+            found[first:last], left = _graduated(stretch, step)
+            errors.append(np.pad(left, beside))
+    return found, np.vstack(errors)
 
 
-def _graduated(values: Array, step: float, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Return a stretch, (n,), smoothed [1]_ with the likeliest weight [2]_, and errors drawn of it.
+def _error_of_mean(values: Array) -> float:
+    return float(np.std(values)) / np.sqrt(len(values))
+
+
+def _graduated(values: Array, step: float) -> tuple[Array, Array]:
+    """Return a stretch, (n,), smoothed [1]_ with the likeliest weight [2]_, and how it may be off.
 
     Rows may be rounded to steps: then it has the largest weight with which it leaves no more than
     their errors, of which those of equal neighbours are one.
@@ -171,30 +176,32 @@ def _graduated(values: Array, step: float, rng: np.random.Generator) -> tuple[Ar
         for other in range(row + 1):
             here = slice(row, count - _ORDER + row)
             bands[_ORDER - (row - other), here] += _STENCIL[row] * _STENCIL[other]
-    # Of a straight line or a parabola they are zero.
-    roughness = ((2 - 2 * np.cos(np.pi * np.arange(count) / count)) ** _ORDER)[_ORDER:]
+    # Nearly the eigenvalues, zero for a parabola.
+    places = np.arange(count)
+    roughness = ((2 - 2 * np.cos(np.pi * places / count)) ** _ORDER)[_ORDER:]
 
     def smooth_with(weight: float, rows: Array) -> Array:
         matrix = weight * bands
         matrix[_ORDER] += 1
-        return np.asarray(solveh_banded(matrix, rows.T), np.float64).T
+        return np.asarray(solveh_banded(matrix, rows), np.float64)
 
     def deviance(weight: float) -> float:
         rest = float(values @ (values - smooth_with(weight, values)))
-        free = weight * roughness / (1 + weight * roughness)
-        return len(free) * float(np.log(max(rest, 1e-300))) - float(np.sum(np.log(free)))
+        rough = weight * roughness / (1 + weight * roughness)
+        return len(rough) * float(np.log(max(rest, 1e-300))) - float(np.sum(np.log(rough)))
 
     if step:
         rough = [np.std(values - smooth_with(weight, values)) for weight in _WEIGHTS]
-        within = np.flatnonzero(np.array(rough) <= step / ROOT_12)
-        weight = _WEIGHTS[within[-1] if len(within) else 0]
+        weight = _WEIGHTS[max(int(np.searchsorted(rough, step / ROOT_12, side="right")) - 1, 0)]
         equal = count / (1 + np.count_nonzero(np.diff(values)))
         noise = step / ROOT_12 * np.sqrt(equal)
     else:
         weight = min(_WEIGHTS, key=deviance)
-        rest = values @ (values - smooth_with(weight, values))
-        noise = np.sqrt(rest / len(roughness))
-    drawn, bent = (rng.standard_normal((_DRAWN, n)) for n in (count, len(roughness)))
-    for place, factor in enumerate(_STENCIL):
-        drawn[:, place : count - _ORDER + place] += np.sqrt(weight) * factor * bent
-    return smooth_with(weight, values), noise * smooth_with(weight, drawn)
+        noise = np.sqrt(values @ (values - smooth_with(weight, values)) / len(roughness))
+    smooth_ones = int(np.count_nonzero(weight * roughness < _LEFT))
+    smooth_ones = min(smooth_ones, _MOST_NUMBERS // count)
+    waves = np.cos(np.pi * np.outer(places + 0.5, np.arange(1, smooth_ones)) / count)
+    basis = np.linalg.qr(np.column_stack((np.vander(places / count, _ORDER), waves)))[0]
+    covariance = basis.T @ smooth_with(weight, basis)
+    directions = basis @ np.linalg.cholesky(0.5 * (covariance + covariance.T))
+    return smooth_with(weight, values), noise * directions.T

@@ -159,7 +159,7 @@ def examine_residuals(likelihood: Likelihood) -> tuple[Likelihood, FindNotes]:
     if misfit < least and estimate_noise(residual, rounding) < levels.NO_SCATTER * misfit:
         return likelihood, list
     growth = compute_growth(residual, residuals.response(likelihood.best), rounding)
-    directions = np.vstack((slopes, residuals.trace.condensed.nuisance)) if len(slopes) else slopes
+    directions = np.vstack((slopes, residuals.trace.condensed.taken)) if len(slopes) else slopes
     basis = absorbed(directions / growth)
     standard = residual / growth
     if np.ptp(growth):

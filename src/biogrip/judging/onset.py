@@ -325,7 +325,7 @@ def _about_load(fits: OnsetFits, diagnosis: Diagnosis) -> Iterator[Note]:
         starts_s = other.onset_s, other.onset_s + _EARLIER * spacing_s
         here, later = (fits.posed(start_s).residuals for start_s in starts_s)
         residual, slopes = here(other.log_parameters)
-        basis = absorbed(np.vstack((slopes, here.trace.condensed.nuisance)))
+        basis = absorbed(np.vstack((slopes, here.trace.condensed.taken)))
         change = later.left(other.log_parameters) - residual
         moved = without(basis, change)
         told = float(moved @ moved)

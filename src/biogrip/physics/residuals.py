@@ -97,9 +97,7 @@ class Residuals:
     @property
     def free(self) -> int:
         """Number of readings minus that of nuisance functions of free amplitude."""
-        norms = np.sum(np.square(self.trace.condensed.nuisance), axis=1)
-        # Those of random amplitude are shorter: they are projected out in part.
-        return self.samples - int(np.count_nonzero(norms > 1 - 1e-9))
+        return self.samples - len(self.trace.condensed.taken)
 
     @property
     def duration_s(self) -> float:
