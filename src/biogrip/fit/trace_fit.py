@@ -147,7 +147,7 @@ def _thinned(count: int) -> IntArray:
 _ROUNDS = 5
 # Errors of a load with functions of their own; rows and readings that are looked at; lags of the
 # response to a ramp; how long a step lasts, over the time from row to row.
-_MOST_FUNCTIONS, _MOST_ROWS, _LAGS, _STEEP = 200, 3000, 1000, 1e-6
+_MOST_FUNCTIONS, _MOST_ROWS, _LAGS, _STEEP = 300, 3000, 1000, 1e-6
 # Most e-folds by which noise is smaller beside them.
 _EFOLDS = 12.0
 # Changes of noise shares and times below this change no confidence limit in its third digit.
