@@ -11,7 +11,8 @@ import pytest
 from biogrip.command import files as command
 from biogrip.command.options import Setting
 from biogrip.command.outputs import read_result, write_result
-from biogrip.command.settings import Asked, is_table, read_table
+from biogrip.command.settings import Asked
+from biogrip.command.sheet import is_table, read_table
 from biogrip.errors import BiogripError
 from biogrip.library import Sample, hold, set_up, simulate
 from tests.helpers.default import STUDY

@@ -61,7 +61,7 @@ def gripper_functions(experiment: Experiment, time_s: Array, parameters: Array) 
             arm = getattr(gripper, part)
             arm = replace(arm, **{key: getattr(arm, key) + error})
             gripper = replace(gripper, **{part: arm})
-        return simulated_response(gripper, network, torque, time_s, nonlinear=False)[0]
+        return simulated_response(gripper, network, torque, time_s)[0]
 
     if not experiment.uncertain:
         return np.zeros((0, len(time_s)))
@@ -130,7 +130,7 @@ def _shown_of_errors(experiment: Experiment, time_s: Array, parameters: Array) -
     course = join_phases(phases, deforms=experiment.instrument.deforms)
     network = experiment.searched.network(parameters)
     given = experiment.gripper, network, course, lags_s
-    of_ramp = simulated_response(*given, nonlinear=False)[0]
+    of_ramp = simulated_response(*given)[0]
     began, ended = (
         np.interp(np.subtract.outer(some_s, at_s), lags_s, of_ramp)
         for at_s in (row_s[:-1], row_s[:-1] + lasts_s)
