@@ -56,6 +56,18 @@ def _hold(text: str) -> tuple[Path, Any]:
     raise ValueError(f"found '{text}', {form}")
 
 
+def _ramp(text: str) -> tuple[Path, Any]:
+    from biogrip.config.source import RAMP
+    from biogrip.traces.columns import TIME_UNITS, known_unit, number_and_unit
+
+    with suppress(ValueError, KeyError):
+        number, unit = number_and_unit(text)
+        duration_s = number * TIME_UNITS[known_unit(unit or "s", TIME_UNITS) or ""]
+        if 0 < duration_s < math.inf:
+            return RAMP, duration_s
+    raise ValueError(f"found '{text}', allowed is a time above 0 with its unit, as in 80ms")
+
+
 def _fix(text: str) -> tuple[Path, Any]:
     name, _, value = text.partition("=")
     with suppress(ValueError):
@@ -103,6 +115,10 @@ GROUPS: dict[str, list[tuple[str, str, Key, str]]] = {
             "what was held from 0 to the end: the stress if strain was read, the force if "
             "displacement, and the reverse; as in '20 pN', 5mbar or 5%%, or in SI units "
             "[1 for a compliance or a modulus]",
+        ),
+        (
+            *("--ramp", "DURATION", _ramp),
+            "within which it was reached, linearly and from its start on, as in 80ms [at once]",
         ),
         (
             *("--load", "COLUMN", "measurement.load"),

@@ -57,6 +57,7 @@ def prepare(recording: Recording, experiment: Experiment) -> tuple[Recording, Ex
     """
     if experiment.record is not None:
         experiment, recording = with_its_steps(experiment, recording)
+    experiment, recording = _with_share(experiment, recording)
     recording = _checked(recording, experiment)
     if experiment.record is not None:
         experiment, recording = without_noise(experiment, recording)
@@ -68,6 +69,26 @@ def prepare(recording: Recording, experiment: Experiment) -> tuple[Recording, Ex
         onset_s = recording.onset_s + later_s
         recording = replace(recording, time_s=recording.time_s - later_s, onset_s=onset_s)
     return recording, experiment
+
+
+def _with_share(experiment: Experiment, recording: Recording) -> tuple[Experiment, Recording]:
+    """Take standard deviations that are a share of each reading for that of the smooth course.
+
+    A reading that is low by chance would weigh more, and all of them be too low by twice the square
+    of the share.
+    """
+    if recording.sd is None or not np.all(recording.readings):
+        return experiment, recording
+    shares = recording.sd / np.abs(recording.readings)
+    share = float(np.median(shares))
+    if np.any(np.abs(shares - share) > levels.SAME_SHARE * share):
+        return experiment, recording
+    said = (
+        f"Standard deviations are {plain(100 * share, 2)} % of each reading: that is taken of the "
+        "smooth course, as readings that are low by chance would weigh more."
+    )
+    recording = replace(recording, sd=None, remarks_before=(*recording.remarks_before, said))
+    return replace(experiment, noise_share=share), recording
 
 
 def _with_zero(experiment: Experiment, recording: Recording) -> tuple[Experiment, Recording]:

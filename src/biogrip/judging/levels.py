@@ -95,6 +95,9 @@ which their growth is known, and its powers of the time if someone spaced them. 
 HELD = 0.1
 """Change of a recorded load, as a share of it, that is held. Chosen."""
 
+SAME_SHARE = 0.02
+"""Difference of standard deviations, over the readings, that may be rounding. Chosen."""
+
 NO_LOAD = 0.01
 """Share of the largest load up to which rows tell the zero: they show hardly more of it. Chosen."""
 

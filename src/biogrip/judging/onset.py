@@ -444,7 +444,7 @@ def _about_ramp(fits: OnsetFits, diagnosis: Diagnosis, ramped: Experiment) -> It
     best, delay_s = diagnosis.likelihood.best, float(fits.time_s[0])
     given = fits.given(diagnosis.likelihood)
     other = replace(fits, experiment=ramped).at(0.0, best)
-    said, how = [], "A ramp is given by a protocol (--config), or as recorded (--load)."
+    said, how = [], "A ramp is given by --ramp DURATION, or as recorded (--load)."
     if moved := _moved(diagnosis, given, [other], 1.0):
         ends = f"ends with the first reading, at {plain(delay_s)} s"
         said.append(f"If the load was no step but a ramp that {ends}: {moved}.")
