@@ -68,6 +68,12 @@ def _ramp(text: str) -> tuple[Path, Any]:
     raise ValueError(f"found '{text}', allowed is a time above 0 with its unit, as in 80ms")
 
 
+def _contact(text: str) -> tuple[Path, Any]:
+    if text == "fit":
+        return ("measurement", "fit_contact"), True
+    raise ValueError(f"found '{text}', allowed is fit")
+
+
 def _fix(text: str) -> tuple[Path, Any]:
     name, _, value = text.partition("=")
     with suppress(ValueError):
@@ -129,6 +135,7 @@ GROUPS: dict[str, list[tuple[str, str, Key, str]]] = {
             "of a sphere that indents the sample, as in '2.5 um': force or "
             "indentation is read, the other is of --hold or --load",
         ),
+        ("--contact", "fit", _contact, "fit where the tip touches the sample, too [at depth 0]"),
         ("--start", "SECONDS", _start, "the protocol's start on the clock, or fit to fit it [0]"),
         (
             *("--from", "PLACE", "measurement.from_s"),

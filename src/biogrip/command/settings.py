@@ -256,11 +256,14 @@ def _with_instrument(
             text = f"found {ramp_s:g} s, allowed is less than the trace's {lasts_s:g} s"
             raise BiogripError(f"{_place_of(RAMP, asked)}: {text}.")
         return _with_hold(blocks, controlled, level, lasts_s, ramp_s), recording, None
+    touching = recording.load
+    if block.tip_power is not None:
+        touching = np.maximum(touching, (-np.inf, 0.0))
     if start_s is None:
-        start_s = _start_of(recording.load)
+        start_s = _start_of(touching)
         blocks["measurement"] = measurement | {"start_s": start_s or None}
     record = _from(recording.load, start_s)
-    largest = float(max(record[:, 1], key=abs))
+    largest = float(max(touching[:, 1], key=abs))
     if instrument.relative and largest:
         record[:, 1] /= largest
     return _with_hold(blocks, controlled, largest, float(record[-1, 0])), recording, record

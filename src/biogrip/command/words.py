@@ -148,6 +148,11 @@ def fitted_in_words(found: Mapping[str, Any]) -> list[str]:
     if "onset_s" in found:
         when = instant(found["onset_s"], *found["onset_limits_s"])
         lines.append(f"The protocol starts at {when} of the clock, as fitted.")
+    if "contact_m" in found:
+        depths = (1e9 * it for it in (found["contact_m"], *found["contact_limits_m"]))
+        value, low, high = (f"{depth:.3g}" for depth in depths)
+        text = f"The tip is deeper than recorded by {value} nm ({low} to {high}), as fitted."
+        lines.append(text)
     if "offset_rad" in found:
         lines.append(f"Offset of the instrument: {in_unit(found['offset_rad'], found)}")
     if "drift_rad_per_s" in found:

@@ -22,8 +22,8 @@ Source = tuple[str, Lines]
 """Name of a file or of another source of keys, and the line (from 1) of each that it has."""
 
 HOLD, RAMP = ("--hold",), ("--ramp",)
-"""Paths of the settings that are no keys: what is controlled from 0 to the end of the trace, and how
-many s it takes to be reached."""
+"""Paths of the settings that are no keys: what is controlled from 0 to the end of the trace, and in
+how many s that is reached."""
 
 LARGEST_BYTES = 1_000_000
 """Bytes of a config file at most."""

@@ -73,6 +73,19 @@ def gripper_functions(experiment: Experiment, time_s: Array, parameters: Array) 
     return np.vstack((0.5 * (above - below), _SECOND_ORDER * second))
 
 
+def contact_function(experiment: Experiment, time_s: Array, parameters: Array) -> Array:
+    """Compute the change of a reading by the depth of a tip, over that, (n_times,)."""
+    assert experiment.record is not None
+    assert experiment.tip_power is not None
+    network = experiment.searched.network(parameters)
+    step = _OF_DEPTH * float(np.abs(experiment.record[:, 1]).max()) ** (1 / experiment.tip_power)
+    ends = [
+        simulated_response(experiment.gripper, network, moved.torque, time_s)[0]
+        for moved in (replace(experiment, deeper=experiment.deeper + by) for by in (step, -step))
+    ]
+    return (ends[0] - ends[1]) / (2 * step)
+
+
 def load_functions(
     experiment: Experiment, time_s: Array, parameters: Array, sensitivity: Array
 ) -> Array:
@@ -148,6 +161,8 @@ _ROUNDS = 5
 # Errors of a load with functions of their own; rows and readings that are looked at; lags of the
 # response to a ramp; how long a step lasts, over the time from row to row.
 _MOST_FUNCTIONS, _MOST_ROWS, _LAGS, _STEEP = 300, 3000, 1000, 1e-6
+# Step of differences, as a share of the largest depth; size of a free function over the noise.
+_OF_DEPTH, _FREE = 1e-3, 1e5
 # Most e-folds by which noise is smaller beside them.
 _EFOLDS = 12.0
 # Changes of noise shares and times below this change no confidence limit in its third digit.
@@ -305,6 +320,10 @@ def _in_turn(
         of_load = load_functions(experiment, time_s, found.parameters, sensitivity)
         uncertain = gripper_functions(experiment, time_s, found.parameters)
         uncertain = np.vstack((uncertain, of_load))
+        if experiment.fit_contact:
+            of_contact = contact_function(experiment, time_s, found.parameters)
+            free = _FREE * np.linalg.norm(residual) / np.linalg.norm(of_contact)
+            uncertain = np.vstack((uncertain, free * of_contact))
         left = problem.residuals.free - len(found.parameters)
         noise_sd = experiment.noise_sd or found.misfit * np.sqrt(len(time_s) / left)
         if len(of_load) and experiment.noise_sd is None:

@@ -18,6 +18,7 @@ from biogrip.digits import counted
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.problem import Progress, silent
 from biogrip.fit.trace_fit import TraceFit
+from biogrip.identify.contact import notes_on_contact
 from biogrip.identify.other_fits import (
     Trace,
     fits_of,
@@ -122,7 +123,8 @@ def _notes_on_trace(
     yield from on_fit
     if experiment.instrument.sweeps:
         return
-    start = notes_on_start(experiment, recording.time_s, recording.readings, judged)
+    start = [*notes_on_contact(replace(judged, recording=recording, experiment=experiment))]
+    start = start or notes_on_start(experiment, recording.time_s, recording.readings, judged)
     yield from start
     rounded = any(note.about == ROUNDED and note.weight == DOUBT for note in judged.notes)
     # Beside another start, or errors of rounding, an offset and a drift mean nothing.

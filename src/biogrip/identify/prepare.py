@@ -22,13 +22,14 @@ from biogrip.errors import BiogripError
 from biogrip.fit.any_sample import proportional_deviations, swept_deviations
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.search_range import GeneRange
+from biogrip.identify.contact import with_contact
 from biogrip.identify.load_noise import with_its_steps, without_noise
 from biogrip.identify.plausibility import check_moduli, check_recording
 from biogrip.judging import levels
 from biogrip.judging.onset import OnsetFits, begins_constant, estimate_onset
 from biogrip.physics.fractional import LONGEST_S, SHORTEST_S
 from biogrip.physics.noise import MOST_SAMPLES, drift_is_flow, estimate_noise, measure_rounding
-from biogrip.physics.protocol import Course, is_held, largest_load
+from biogrip.physics.protocol import Course, evaluate, is_held, largest_load
 from biogrip.traces.columns import place
 from biogrip.traces.reader import Recording
 
@@ -62,6 +63,8 @@ def prepare(recording: Recording, experiment: Experiment) -> tuple[Recording, Ex
     if experiment.record is not None:
         experiment, recording = without_noise(experiment, recording)
     experiment, recording = _with_zero(experiment, recording)
+    if experiment.fit_contact:
+        experiment = with_contact(for_trace(experiment, recording), recording)
     experiment = for_trace(experiment, recording)
     if experiment.fit_start and recording.onset_s is not None:
         fits = OnsetFits(experiment, recording.time_s, recording.readings)
@@ -101,12 +104,13 @@ def _with_zero(experiment: Experiment, recording: Recording) -> tuple[Experiment
         return experiment, recording
     begins_s = 0.0
     if experiment.record is not None:
-        loads = np.abs(experiment.record[:, 1])
+        loads = np.abs(evaluate(experiment.torque, experiment.record[:, 0]))
         begins_s = float(experiment.record[np.argmax(loads > levels.NO_LOAD * loads.max()), 0])
     if not begins_constant(recording.time_s, recording.readings, begins_s):
         return experiment, recording
     before = recording.readings[recording.time_s < begins_s][:-1]
-    zero = f"{plain(float(np.mean(before)))} {experiment.instrument.read.unit}".rstrip()
+    read, unit = recording.read.instrument.read, recording.units[1]
+    zero = f"{plain(read.in_unit(float(np.mean(before)), unit))} {unit}".removesuffix(" 1")
     rows = f"{len(before)} rows before the {experiment.instrument.controlled.name}"
     said = (*recording.remarks_before, f"Zero from {rows}: {zero}, taken off.")
     recording = replace(recording, remarks_before=said)

@@ -104,9 +104,6 @@ NO_LOAD = 0.01
 FEWEST_STILL = 8
 """Rows of a record from which on a trend is told: of fewer, an arc at a sine's crest is none."""
 
-SHORT_RAMP = 0.1
-"""Share of the trace up to which a ramp before it may pass for a step. Chosen."""
-
 WHITE = 1.5
 """Misfit over the scatter of neighbours that a right fit does not exceed. Chosen, above `TOO_MUCH`:
 it accuses a clock."""

@@ -440,7 +440,7 @@ def _moved(
 
 
 def _about_ramp(fits: OnsetFits, diagnosis: Diagnosis, ramped: Experiment) -> Iterator[Note]:
-    """Yield a note if a ramp up to the first reading moves a value out, or a short one before 0."""
+    """Yield a note if a ramp up to the first reading moves a value out of its limits."""
     best, delay_s = diagnosis.likelihood.best, float(fits.time_s[0])
     given = fits.given(diagnosis.likelihood)
     other = replace(fits, experiment=ramped).at(0.0, best)
@@ -450,36 +450,8 @@ def _about_ramp(fits: OnsetFits, diagnosis: Diagnosis, ramped: Experiment) -> It
         said.append(f"If the load was no step but a ramp that {ends}: {moved}.")
     if ramped.record is not None:
         how = "Rows of the load before its first one would tell."
-    elif longest := _longest_ramp(fits, diagnosis, given):
-        name = fits.experiment.instrument.controlled.name
-        said.append(
-            f"The {name} is taken to rise at once: a ramp of more than {plain(longest[0], 2)} s "
-            f"before 0 s moves {longest[1]} beyond its limits."
-        )
     if said:
         yield Note(HARMLESS, " ".join([*said, how]))
-
-
-def _longest_ramp(
-    fits: OnsetFits, diagnosis: Diagnosis, given: OnsetFit
-) -> tuple[float, str] | None:
-    """Return what length of a ramp before a step moves which quantity to a limit, if it is short.
-
-    A ramp that ends at 0 is, to first order, a step halfway of it.
-    """
-    if len(fits.experiment.phases) > 1:
-        return None
-    earlier_s = _EARLIER * spacing_at(fits.time_s, 0.0)
-    earlier = fits.at(-earlier_s, given.log_parameters).log_parameters
-    lengths = []
-    for each in diagnosis.findings:
-        if each.low and each.high:
-            value, moved = (each.quantity.log(x) for x in (given.log_parameters, earlier))
-            room = min(abs(np.log(end) - value) for end in (each.low, each.high))
-            length_s = 2 * earlier_s * room / max(abs(moved - value), 1e-12)
-            lengths.append((length_s, each.quantity.label))
-    shortest = min(lengths, default=(np.inf, ""))
-    return shortest if shortest[0] < levels.SHORT_RAMP * fits.time_s[-1] else None
 
 
 def _with_ramp(experiment: Experiment, time_s: Array) -> Experiment | None:

@@ -485,8 +485,7 @@ def _load(
     _check_order(path, columns, history[:, 0], lines)
     time_s = history[:, 0] * AXES[columns.axis][units[0]]
     sizes = columns.instrument.controlled.in_si(history[:, 1], units[-1])
-    # Before its contact a sphere neither presses nor indents.
-    return np.column_stack((time_s, np.maximum(sizes, 0.0) if columns.sphere else sizes))
+    return np.column_stack((time_s, sizes))
 
 
 def _averaged(values: Array, lines: IntArray, first_sd: int = 2) -> tuple[Array, IntArray, int]:
