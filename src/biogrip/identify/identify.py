@@ -31,6 +31,7 @@ from biogrip.identify.other_fits import (
 from biogrip.identify.prepare import prepare
 from biogrip.judging.diagnosis import Diagnosis, diagnose_all, with_times
 from biogrip.judging.doubts import DOUBT, HARMLESS, ROUNDED, Note, find_slow_misfit, name_suspects
+from biogrip.judging.linearity import notes_on_gains
 from biogrip.judging.onset import notes_on_start, profile_over_onset
 from biogrip.traces.reader import Recording
 
@@ -123,6 +124,7 @@ def _notes_on_trace(
     yield from on_fit
     if experiment.instrument.sweeps:
         return
+    yield from notes_on_gains(judged.likelihood, judged.notes)
     start = [*notes_on_contact(replace(judged, recording=recording, experiment=experiment))]
     start = start or notes_on_start(experiment, recording.time_s, recording.readings, judged)
     yield from start

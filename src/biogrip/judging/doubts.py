@@ -279,7 +279,10 @@ def name_suspects(residuals: Residuals, times: float, scale: float) -> str:
     fit = fit_any_sample(residuals)
     other, left = fit.sd / scale, fit.left_of_readings()
     least = plain(other, 2)
-    gives, culprits = "gives this trace under this protocol", "load, clock, contact or drift"
+    gives, culprits = (
+        "gives this trace under this protocol",
+        "load, clock, contact, drift, or a sample that is not linear",
+    )
     if residuals.course.sweeps:
         gives = "has both moduli (Kramers-Kronig)"
         _, culprits = whiteness.find_inertia(residuals, *left)

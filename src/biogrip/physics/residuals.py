@@ -130,6 +130,12 @@ class Residuals:
         condensed = replace(trace.condensed, all_s=earlier_s)
         return replace(self, trace=replace(trace, condensed=condensed, known_scatter=trace.scatter))
 
+    def under(self, course: Course) -> "Residuals":
+        """Return the residuals of a trace under another protocol; noise and nuisance stay."""
+        condensed = replace(self.trace.condensed, course=course)
+        trace = replace(self.trace, condensed=condensed, known_scatter=self.trace.scatter)
+        return replace(self, course=course, trace=trace)
+
     @property
     def of_responses(self) -> Hashable:
         """What responses depend on: with equal ones, residuals differ in trace and noise alone."""
