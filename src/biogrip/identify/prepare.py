@@ -16,6 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
+import biogrip.levels as levels
 from biogrip.arrays import Array
 from biogrip.digits import plain
 from biogrip.errors import BiogripError
@@ -25,8 +26,12 @@ from biogrip.fit.search_range import GeneRange
 from biogrip.identify.contact import with_contact
 from biogrip.identify.load_noise import with_its_steps, without_noise
 from biogrip.identify.plausibility import check_moduli, check_recording
+<<<<<<< HEAD
 from biogrip.judging import levels
 from biogrip.judging.onset import OnsetFits, begins_constant, estimate_onset
+=======
+from biogrip.judging.onset import OnsetFits, estimate_onset
+>>>>>>> origin/main
 from biogrip.physics.fractional import LONGEST_S, SHORTEST_S
 from biogrip.physics.noise import MOST_SAMPLES, drift_is_flow, estimate_noise, measure_rounding
 from biogrip.physics.protocol import Course, evaluate, is_held, largest_load
