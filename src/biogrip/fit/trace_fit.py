@@ -11,28 +11,19 @@ from functools import partial
 
 import numpy as np
 
-<<<<<<< HEAD
-from biogrip.arrays import Array, BoolArray, IntArray
-=======
 import biogrip.levels as levels
-from biogrip.arrays import Array, BoolArray
->>>>>>> origin/main
+from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.digits import counted, rounded
 from biogrip.fit.experiment import Experiment, pose
 from biogrip.fit.least_squares import fit_from, identify_many
 from biogrip.fit.nested_fits import deepen
-<<<<<<< HEAD
 from biogrip.fit.noise_model_fit import (
     NoiseModelLikelihood,
     absorbed,
     growth_left,
     outliers_of,
 )
-from biogrip.fit.problem import Fit, Progress, TraceProblem, silent
-=======
-from biogrip.fit.noise_model_fit import NoiseModelLikelihood, growth_left, outliers_of
 from biogrip.fit.problem import Fit, ReportProgress, TraceProblem, silent
->>>>>>> origin/main
 from biogrip.physics.noise import NoiseModel, drift_is_flow
 from biogrip.physics.protocol import Phase, join_phases
 from biogrip.physics.simulation import simulated_response
@@ -83,7 +74,6 @@ def gripper_functions(experiment: Experiment, time_s: Array, parameters: Array) 
     return np.vstack((0.5 * (above - below), _SECOND_ORDER * second))
 
 
-<<<<<<< HEAD
 def contact_function(experiment: Experiment, time_s: Array, parameters: Array) -> Array:
     """Compute the change of a reading by the depth of a tip, over that, (n_times,)."""
     assert experiment.record is not None
@@ -168,7 +158,7 @@ def _thinned(count: int) -> IntArray:
     return np.unique(np.linspace(0, count - 1, min(count, _MOST_ROWS)).astype(np.int64))
 
 
-_ROUNDS = 5
+_MOST_ROUNDS = 5
 # Errors of a load with functions of their own; rows and readings that are looked at; lags of the
 # response to a ramp; how long a step lasts, over the time from row to row.
 _MOST_FUNCTIONS, _MOST_ROWS, _LAGS, _STEEP = 300, 3000, 1000, 1e-6
@@ -176,9 +166,6 @@ _MOST_FUNCTIONS, _MOST_ROWS, _LAGS, _STEEP = 300, 3000, 1000, 1e-6
 _OF_DEPTH, _FREE = 1e-3, 1e5
 # Most e-folds by which noise is smaller beside them.
 _EFOLDS = 12.0
-=======
-_MOST_ROUNDS = 5
->>>>>>> origin/main
 # Changes of noise shares and times below this change no confidence limit in its third digit.
 _NOISE_SETTLED = 1e-2
 # The same of a fit that moves by less, in standard deviations.

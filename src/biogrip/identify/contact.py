@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import chdtri, stdtrit
 
+import biogrip.levels as levels
 from biogrip.arrays import Array
 from biogrip.digits import plain
 from biogrip.fit.any_sample import fit_responses, spread_lags
@@ -20,7 +21,6 @@ from biogrip.fit.least_squares import identify_many
 from biogrip.fit.noise_model_fit import absorbed
 from biogrip.fit.problem import silent
 from biogrip.fit.trace_fit import contact_function
-from biogrip.judging import levels
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.judging.doubts import DOUBT, REJECTED, REJECTION, Note
 from biogrip.physics.modes import lag_course

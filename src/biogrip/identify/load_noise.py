@@ -32,11 +32,7 @@ from biogrip.arrays import Array
 from biogrip.digits import plain
 from biogrip.fit.any_sample import fit_responses, spread_lags
 from biogrip.fit.experiment import Experiment
-<<<<<<< HEAD
-from biogrip.judging import levels
 from biogrip.judging.whiteness import is_still
-=======
->>>>>>> origin/main
 from biogrip.physics.modes import lag_course
 from biogrip.physics.noise import ROOT_12, measure_rounding, without
 from biogrip.physics.protocol import with_steps
@@ -48,16 +44,10 @@ _FAR, _FEWEST = 8.0, 20
 # Variance of a direction that is smoothed out, over that of one that is left; most numbers at once.
 _LEFT, _MOST_NUMBERS = 30.0, 20_000_000
 _LAGS_A_DECADE = 2
-<<<<<<< HEAD
-# Most readings that are compared, and by how much χ² has to fall: by less than a tenth it does
-# where nothing is smoothed out, and if it hardly falls, both courses will do.
-_MOST_READINGS, _BETTER = 5000, 1.0
-# Differences whose squares are smoothed, and their order.
-_STENCIL, _ORDER = np.array([-1.0, 3.0, -3.0, 1.0]), 3
-=======
 # Most readings that are compared.
 _MOST_READINGS = 5000
->>>>>>> origin/main
+# Differences whose squares are smoothed, and their order.
+_STENCIL, _ORDER = np.array([-1.0, 3.0, -3.0, 1.0]), 3
 
 
 def without_noise(experiment: Experiment, recording: Recording) -> tuple[Experiment, Recording]:
@@ -70,7 +60,7 @@ def without_noise(experiment: Experiment, recording: Recording) -> tuple[Experim
     smooth = np.column_stack((experiment.record[:, 0], values))
     records, count = (experiment.record, smooth), min(len(recording.time_s), _MOST_READINGS)
     rest = _left(experiment, records, recording.time_s, recording.readings)
-    if rest[0] <= rest[1] * np.exp(_BETTER / count):
+    if rest[0] <= rest[1] * np.exp(levels.SMOOTHED / count):
         return experiment, recording
     noise = float(np.std(left) / np.max(np.abs(experiment.record[:, 1])))
     experiment = replace(experiment, record=smooth, load_errors=errors)
@@ -84,7 +74,6 @@ def with_its_steps(experiment: Experiment, recording: Recording) -> tuple[Experi
     the smoothed course better.
     """
     assert experiment.record is not None
-<<<<<<< HEAD
     record, uncertain_s = with_steps(experiment.record)
     if step := measure_rounding(experiment.record[:, 1]):
         other, other_s = with_steps(experiment.record, levels.ONE_STEP * step)
@@ -106,17 +95,6 @@ def with_its_steps(experiment: Experiment, recording: Recording) -> tuple[Experi
     said = f"Taken off the {controlled.name}, a tare that readings do not follow: {size}."
     recording = replace(recording, remarks_before=(*recording.remarks_before, said))
     return replace(experiment, record=record - (0.0, tare)), recording
-=======
-    smooth = experiment.record.copy()
-    smooth[:, 1] = smoothed(smooth[:, 1])
-    values, largest = experiment.record[:, 1], float(np.max(np.abs(experiment.record[:, 1])))
-    noise = float(np.std(smooth[:, 1] - values)) / largest
-    if not noise:
-        return smooth, noise
-    rest = _left(experiment, (experiment.record, smooth), time_s, readings)
-    better = rest[0] > rest[1] * np.exp(levels.SMOOTHED / min(len(time_s), _MOST_READINGS))
-    return (smooth, noise) if better else (experiment.record, 0.0)
->>>>>>> origin/main
 
 
 def tare_of(experiment: Experiment, recording: Recording) -> float:

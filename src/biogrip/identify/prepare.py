@@ -26,12 +26,7 @@ from biogrip.fit.search_range import GeneRange
 from biogrip.identify.contact import with_contact
 from biogrip.identify.load_noise import with_its_steps, without_noise
 from biogrip.identify.plausibility import check_moduli, check_recording
-<<<<<<< HEAD
-from biogrip.judging import levels
 from biogrip.judging.onset import OnsetFits, begins_constant, estimate_onset
-=======
-from biogrip.judging.onset import OnsetFits, estimate_onset
->>>>>>> origin/main
 from biogrip.physics.fractional import LONGEST_S, SHORTEST_S
 from biogrip.physics.noise import MOST_SAMPLES, drift_is_flow, estimate_noise, measure_rounding
 from biogrip.physics.protocol import Course, evaluate, is_held, largest_load

@@ -42,12 +42,8 @@ from biogrip.judging.likelihood import Likelihood, check_rows, make_likelihood
 from biogrip.judging.profiles import compute_valley
 from biogrip.judging.quantities import characteristic_times, parameters_and_sum
 from biogrip.judging.verdicts import DETERMINED, Finding, Trade, compute_findings, find_trade_offs
-<<<<<<< HEAD
 from biogrip.judging.what_moves import Move, find_moves
-from biogrip.judging.without_model import KINDS, WithoutModel, decades, tell_without_model
-=======
 from biogrip.judging.without_model import KINDS, WithoutModel, tell_without_model, times_told
->>>>>>> origin/main
 from biogrip.physics.sample_model import C_P
 from biogrip.physics.simulation import Grip
 from biogrip.traces.reader import Recording

@@ -10,19 +10,18 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import fdtrc, stdtrit
 
+import biogrip.levels as levels
 from biogrip.arrays import Array
 from biogrip.digits import p_value, plain, with_limits
-from biogrip.fit.least_squares import fit_from
 from biogrip.fit.noise_model_fit import absorbed
-from biogrip.judging import levels
 from biogrip.judging.doubts import DOUBT, MANY, REJECTED, REJECTION, Note, compute_status
 from biogrip.judging.likelihood import Likelihood
 from biogrip.physics.noise import without
 from biogrip.physics.protocol import Course, superposed
 from biogrip.physics.residuals import Residuals
 
-# Most levels of which gains are told; fits with which gains settle.
-_MOST_LEVELS, _ROUNDS = 10, 4
+# Most levels of which gains are told; steps with which gains settle.
+_MOST_LEVELS, _STEPS = 10, 8
 
 
 def held_levels(course: Course) -> list[tuple[float, Course]]:
@@ -80,18 +79,24 @@ def notes_on_gains(likelihood: Likelihood, notes: list[Note]) -> Iterator[Note]:
 def _gains(likelihood: Likelihood, courses: list[Course]) -> tuple[Array, Array]:
     """Fit gains over that of the first level, (n_levels - 1,), and half widths of their limits.
 
-    A gain of what is read is one of the load: with loads so scaled the sample is fitted again.
+    A gain of what is read is one of the load: by steps of Gauss-Newton, loads are scaled, and with
+    them the sample is fitted.
     """
-    problem, best, gains = likelihood.problem, likelihood.best, np.ones(len(courses) - 1)
-    given = problem.residuals.course
-    for _ in range(_ROUNDS):
-        more, errors, _ = _more(problem.residuals, best, courses, likelihood.confidence)
+    residuals, best = likelihood.problem.residuals, likelihood.best.copy()
+    gains, given = np.ones(len(courses) - 1), residuals.course
+    for _ in range(_STEPS):
+        left, slopes = residuals(best)
+        shown = [replace(residuals, course=course).response(best) for course in courses[1:]]
+        cleared = residuals.trace.condensed.cleared(np.array(shown))
+        step = np.linalg.lstsq(np.vstack((slopes, cleared)).T, -left)[0]
+        best += np.clip(step[: len(best)], -1.0, 1.0)
+        more = 1 + np.clip(step[len(best) :], -0.5, 0.5)
         gains *= more
-        courses = [courses[0], *(own.times(by) for own, by in zip(courses[1:], more, strict=True))]
-        pairs = zip(courses[1:], more, strict=True)
-        given = _sum([given, *(own.times(1 - 1 / by) for own, by in pairs)])
-        problem = replace(problem, residuals=problem.residuals.under(given))
-        best = fit_from([problem], best).x[0]
+        scaled = [course.times(by) for course, by in zip(courses[1:], more, strict=True)]
+        added = [course.times(1 - 1 / by) for course, by in zip(scaled, more, strict=True)]
+        courses, given = [courses[0], *scaled], _sum([given, *added])
+        residuals = residuals.under(given)
+    _, errors, _ = _more(residuals, best, courses, likelihood.confidence)
     return gains, gains * errors
 
 

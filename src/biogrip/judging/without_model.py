@@ -194,15 +194,14 @@ def tell_without_model(
         independent, freedom = as_correlated(*left)
         sd = fit.sd * math.sqrt(free / independent)
     root = partial(_root, confidence, freedom, float(sd / residuals.noise_scale))
-<<<<<<< HEAD
-    times_s = at_s or decades(*fit.lags.covered_s)
+    times_s = at_s or times_told(*fit.lags.covered_s)
     chosen = [each for each in _quantities(residuals, fit.lags, times_s) if each.kind in kinds]
-    told = [_told(fit, each, root) for each in chosen]
+    told = [_find_limits(fit, each, root) for each in chosen]
     moves = _moves(fit, [own for own, it in zip(chosen, told, strict=True) if it.value])
     return WithoutModel(told, fit.misfit, times, is_linear, fit.lags.covered_s, moves)
 
 
-def _moves(fit: AnySampleFit, quantities: Sequence["_Quantity"]) -> list[Move]:
+def _moves(fit: AnySampleFit, quantities: Sequence["_Functional"]) -> list[Move]:
     """Return what errors of the instrument do to quantities.
 
     It is half the difference of fits with the error added to the readings and taken off.
@@ -219,12 +218,6 @@ def _moves(fit: AnySampleFit, quantities: Sequence["_Quantity"]) -> list[Move]:
     moved = (values(mistake.change) - values(-mistake.change) for mistake in mistakes)
     changes = np.array([0.5 * each / given for each in moved]).T
     return as_moves(mistakes, [quantity.name for quantity in quantities], changes)
-=======
-    times_s = at_s or times_told(*fit.lags.covered_s)
-    quantities = (each for each in _quantities(residuals, fit.lags, times_s) if each.kind in kinds)
-    told = [_find_limits(fit, each, root) for each in quantities]
-    return WithoutModel(told, fit.misfit, times, is_linear, fit.lags.covered_s)
->>>>>>> origin/main
 
 
 def _root(confidence: float, freedom: float, sd: float, more: int) -> float:
