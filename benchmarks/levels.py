@@ -538,9 +538,9 @@ that was, and doubt is right.
 
 ## What the instrument adds
 
-A zero off by 5 % of the peak, of which rows before the start tell; a contact 0 to 60 nm off, beside a
-baseline of 3 %; a rise that is told; an oscillation recorded from any phase on; records whose sensor
-has noise. Limits may hold more often than in 95 %, as what a smoothed record leaves is hardly known.
+A zero off by 5 % of the peak, of which rows before the start tell; a contact 0 to 60 nm off, beside
+a baseline of 3 %; a rise that is told; an oscillation recorded from any phase on; records whose
+sensor has noise.
 
 {adds}
 
