@@ -5,9 +5,10 @@ import re
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.fit.least_squares import identify_from
-from biogrip.judging.diagnosis import diagnose
+from biogrip.fit.experiment import Experiment
+from biogrip.fit.least_squares import fit_from
 from biogrip.judging.doubts import Note
+from biogrip.judging.likelihood import make_likelihood
 from biogrip.judging.linearity import notes_on_gains
 from biogrip.library import Sample, set_up
 from biogrip.physics.instruments import INSTRUMENTS
@@ -28,9 +29,15 @@ def told(gains: tuple[float, ...], seed: int) -> list[Note]:
             strain += sign * gain * level * yielded * (since > 0)
     noise = 0.005 * np.max(strain) * np.random.default_rng(seed).standard_normal(len(TIMES))
     experiment = set_up(INSTRUMENTS["strain"], PHASES, Sample("zener_kelvin"))
-    problem = experiment.of(TIMES, strain + noise)
-    judged = diagnose(problem, identify_from(problem, experiment.logs(SAMPLE)), confidence=0.95)
-    return list(notes_on_gains(judged.likelihood, judged.notes))
+    return notes_of(experiment, strain + noise)
+
+
+def notes_of(experiment: Experiment, strain: Array) -> list[Note]:
+    """Notes on a fit from near the truth."""
+    problem = experiment.of(TIMES, strain)
+    fit = fit_from([problem], experiment.logs(SAMPLE))
+    given = problem, fit.x[0], float(fit.misfit[0])
+    return list(notes_on_gains(make_likelihood(*given, confidence=0.95), []))
 
 
 def test_gains_of_a_sample_that_stiffens_hold_the_truth() -> None:
@@ -51,6 +58,4 @@ def test_of_linear_samples_nothing_is_said() -> None:
 
 def test_one_level_has_no_gain() -> None:
     experiment = set_up(INSTRUMENTS["strain"], (hold(450.0, 2.0),), Sample("zener_kelvin"))
-    problem = experiment.of(TIMES, 2 / 400 - 2 * np.expm1(-TIMES / 20) / 300)
-    judged = diagnose(problem, identify_from(problem, experiment.logs(SAMPLE)), confidence=0.95)
-    assert not list(notes_on_gains(judged.likelihood, judged.notes))
+    assert not notes_of(experiment, 2 / 400 - 2 * np.expm1(-TIMES / 20) / 300)

@@ -141,7 +141,9 @@ def smoothed(values: Array) -> tuple[Array, Array]:
 
     It is off by directions, (n_directions, n), times independent standard normal numbers.
     """
-    changes, step = np.abs(np.diff(values)), measure_rounding(values)
+    changes = np.abs(np.diff(values))
+    # A few equal steps are a staircase.
+    step = measure_rounding(values) if np.count_nonzero(changes) >= _FEWEST else 0.0
     far = np.maximum(_FAR * np.median(changes), levels.ONE_STEP * step)
     ends = 1 + np.flatnonzero(changes > far)
     found, errors = values.copy(), [np.zeros((0, len(values)))]
