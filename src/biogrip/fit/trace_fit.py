@@ -155,15 +155,15 @@ def _shown_of_errors(experiment: Experiment, time_s: Array, parameters: Array) -
 
 def _thinned(count: int) -> IntArray:
     """Return places of at most so many rows, spread evenly."""
-    return np.unique(np.linspace(0, count - 1, min(count, _MOST_ROWS)).astype(np.int64))
+    return np.unique(np.linspace(0, count - 1, min(count, _ROWS_SHOWN)).astype(np.int64))
 
 
 _MOST_ROUNDS = 5
 # Errors of a load with functions of their own; rows and readings that are looked at; lags of the
 # response to a ramp; how long a step lasts, over the time from row to row.
-_MOST_FUNCTIONS, _MOST_ROWS, _LAGS, _STEEP = 300, 3000, 1000, 1e-6
+_MOST_FUNCTIONS, _ROWS_SHOWN, _LAGS, _STEEP = 300, 3000, 1000, 1e-6
 # Step of differences, as a share of the largest depth; size of a free function over the noise.
-_OF_DEPTH, _FREE = 1e-3, 1e5
+_OF_DEPTH, _FREE_OVER_NOISE = 1e-3, 1e5
 # Most e-folds by which noise is smaller beside them.
 _EFOLDS = 12.0
 # Changes of noise shares and times below this change no confidence limit in its third digit.
@@ -324,7 +324,7 @@ def _in_turn(
         uncertain = np.vstack((uncertain, of_load))
         if experiment.fit_contact:
             of_contact = contact_function(experiment, time_s, found.parameters)
-            free = _FREE * np.linalg.norm(residual) / np.linalg.norm(of_contact)
+            free = _FREE_OVER_NOISE * np.linalg.norm(residual) / np.linalg.norm(of_contact)
             uncertain = np.vstack((uncertain, free * of_contact))
         left = problem.residuals.free - len(found.parameters)
         noise_sd = experiment.noise_sd or found.misfit * np.sqrt(len(time_s) / left)

@@ -28,7 +28,7 @@ from biogrip.physics.noise import without
 from biogrip.traces.reader import Recording
 
 # Contacts that are tried, up to this share of the largest depth off; lags a decade; most steps.
-_TRIED, _FURTHEST, _LAGS_A_DECADE, _MOST_STEPS = 41, 0.5, 2, 50
+_DEPTHS_TRIED, _FURTHEST, _LAGS_OF_CONTACT, _MOST_EVALUATIONS = 41, 0.5, 2, 50
 
 
 def with_contact(experiment: Experiment, recording: Recording) -> Experiment:
@@ -37,7 +37,7 @@ def with_contact(experiment: Experiment, recording: Recording) -> Experiment:
     assert experiment.tip_power is not None
     time_s, readings = recording.time_s, recording.readings
     deepest = float(experiment.record[:, 1].max()) ** (1 / experiment.tip_power)
-    lags = spread_lags(experiment.torque, time_s, _LAGS_A_DECADE)
+    lags = spread_lags(experiment.torque, time_s, _LAGS_OF_CONTACT)
     nuisance = experiment.nuisance(time_s)
 
     def rest(deeper: float) -> float:
@@ -45,7 +45,7 @@ def with_contact(experiment: Experiment, recording: Recording) -> Experiment:
         responses = without(nuisance, lag_course(course, lags, time_s))
         return fit_responses(without(nuisance, readings), responses)[1]
 
-    tried = deepest * np.linspace(-_FURTHEST, _FURTHEST, _TRIED)
+    tried = deepest * np.linspace(-_FURTHEST, _FURTHEST, _DEPTHS_TRIED)
     guess = replace(experiment, deeper=float(min(tried, key=rest)))
     return replace(experiment, deeper=_fitted(guess, time_s, readings))
 
@@ -73,7 +73,7 @@ def _fitted(guess: Experiment, time_s: Array, readings: Array) -> float:
 
     start = np.append(np.log(found.parameters), 0.0)
     ends = np.append(problem.low, -np.inf), np.append(problem.high, np.inf)
-    fit = least_squares(lambda x: at(x)[1] / noise, start, slopes, ends, max_nfev=_MOST_STEPS)
+    fit = least_squares(lambda x: at(x)[1] / noise, start, slopes, ends, max_nfev=_MOST_EVALUATIONS)
     return guess.deeper + depth * float(fit.x[-1])
 
 

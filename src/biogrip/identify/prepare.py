@@ -166,7 +166,8 @@ def _checked(trace: Recording, experiment: Experiment) -> Recording:
                 f"allowed with {experiment.model.name} are {1 / LONGEST_S:g} to {1 / SHORTEST_S:g}."
             )
         return _with_deviations(trace, share, experiment.noise_sd)
-    if suspicion := check_recording(trace, experiment, _noise(trace, experiment)):
+    zeroed, _ = _with_zero(experiment, trace)
+    if suspicion := check_recording(trace, zeroed, _noise(trace, experiment)):
         trace = replace(trace, remarks_before=(*trace.remarks_before, suspicion))
     if share is None:
         return trace

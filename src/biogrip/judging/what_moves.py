@@ -24,7 +24,7 @@ from biogrip.physics.protocol import is_storage, spacing_at
 from biogrip.physics.residuals import Residuals
 
 # Error of a zero and of a gain, as a share; of a phase, in rad; last decimal of what they move.
-_SHARE, _PHASE, _DECIMALS = 0.01, np.radians(1.0), 6
+_WRONG_SHARE, _WRONG_PHASE, _DECIMALS = 0.01, np.radians(1.0), 6
 
 Response = Callable[[Residuals], Array]
 """What a sample shows, (n_samples,), under the protocol and at the times of residuals."""
@@ -64,12 +64,12 @@ def find_mistakes(residuals: Residuals, response: Response) -> Iterator[Mistake]
     gain = f"the {read} is read 1 % too large"
     if residuals.course.sweeps:
         turned = np.where(is_storage(time_s), -1.0, 1.0) * shown[::-1]
-        yield Mistake("gain", gain, _SHARE * shown)
-        yield Mistake("phase", "the phase is read 1 degree too large", _PHASE * turned)
+        yield Mistake("gain", gain, _WRONG_SHARE * shown)
+        yield Mistake("phase", "the phase is read 1 degree too large", _WRONG_PHASE * turned)
         return
-    zero = np.full(len(time_s), _SHARE * float(np.max(np.abs(shown))))
+    zero = np.full(len(time_s), _WRONG_SHARE * float(np.max(np.abs(shown))))
     yield Mistake("zero", "the zero is 1 % of the peak too high", zero)
-    yield Mistake("gain", f"{gain}, or the {controlled} 1 % too small", _SHARE * shown)
+    yield Mistake("gain", f"{gain}, or the {controlled} 1 % too small", _WRONG_SHARE * shown)
     interval_s = spacing_at(time_s, 0.0)
     earlier = residuals.later(-interval_s)
     words = f"the {controlled} comes {interval_s:.2g} s earlier"
