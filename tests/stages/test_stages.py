@@ -5,9 +5,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.optimize import least_squares
 
-from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.models import Sample
@@ -18,7 +16,6 @@ from biogrip_study.stages.identification import experiment_for
 from biogrip_study.stages.judgement import expect
 from tests.helpers.default import STUDY, seen, study_of
 from tests.helpers.places import EXAMPLE
-from tests.helpers.problems import MODEL, rotation
 
 
 def drop(torque_Nm: float, *more: Phase, unilateral: bool = False) -> Any:

@@ -307,13 +307,6 @@ def test_whatever_is_added_changes_no_other_point(tmp_path: Path) -> None:
         assert {name: after[name].plain for name in before} == before
 
 
-def test_a_map_takes_two_exchangeable_parameters_and_another(tmp_path: Path) -> None:
-    """Of k, k_p, c and c_p one may be known; with k and k_p known c and c_p are all."""
-    for fixed, has in (("{k_p: 12.3}", True), ("{k: 35, k_p: 12.3}", False), ("{c: 300}", False)):
-        study = load(tmp_path, f"cases: {{endothelial_cell: {{fixed: {fixed}}}}}")
-        assert study.cases["endothelial_cell"].has_valley is has
-
-
 def test_a_wrong_block_of_the_study_is_told_once(tmp_path: Path) -> None:
     """Below a headline, and not once more of each of the three cases, which inherit it."""
     assert refusal(tmp_path, "protocol: 5").count("\n") == 1

@@ -207,7 +207,7 @@ def test_the_bound_of_a_case_is_of_its_own_calibration(tmp_path: Path) -> None:
         files.append(tmp_path / f"{name}.yaml")
         files[-1].write_text(calibration_yaml(*[CalibratedArm(stiff, arm)] * 2))
         of_targets.append(tmp_path / f"{name}.csv")
-        targets.simulate(study.cases[name], of_targets[-1])
+        targets.simulate_target(study.cases[name], of_targets[-1])
         batches.append(tmp_path / name / "seeds_0-1.csv")
         every = ("k", "k_p", "c", "c_p", "c + c_p")
         rest = 1.0, 0.9, 1.1, 1.0, "determined", 0.9, 1.1

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from biogrip.config.case import SampleCase
-from biogrip.config.source import HOLD
+from biogrip.config.source import HOLD, RAMP
 from biogrip.digits import plain
 from biogrip.identify.other_fits import Trace
 from biogrip.traces.columns import held_unit
@@ -38,7 +38,8 @@ def load_in_words(trace: Trace, case: SampleCase, given: Mapping[str, Any]) -> s
     number, unit = held_unit(given[HOLD[0]], controlled)
     start = "its start, as fitted," if experiment.fit_start else f"{start_s:g} s"
     what = f"{_with_unit(f'{number:g}', unit)} from {start} to {recording.form['last_s']:g} s"
-    return f"Held: {what}{_contact(case)}."
+    rise = f", reached within {given[RAMP[0]]:g} s" if RAMP[0] in given else ""
+    return f"Held: {what}{rise}{_contact(case)}."
 
 
 def _contact(case: SampleCase) -> str:

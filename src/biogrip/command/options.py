@@ -56,6 +56,24 @@ def _hold(text: str) -> tuple[Path, Any]:
     raise ValueError(f"found '{text}', {form}")
 
 
+def _ramp(text: str) -> tuple[Path, Any]:
+    from biogrip.config.source import RAMP
+    from biogrip.traces.columns import TIME_UNITS, known_unit, number_and_unit
+
+    with suppress(ValueError, KeyError):
+        number, unit = number_and_unit(text)
+        duration_s = number * TIME_UNITS[known_unit(unit or "s", TIME_UNITS) or ""]
+        if 0 < duration_s < math.inf:
+            return RAMP, duration_s
+    raise ValueError(f"found '{text}', allowed is a time above 0 with its unit, as in 80ms")
+
+
+def _contact(text: str) -> tuple[Path, Any]:
+    if text == "fit":
+        return ("measurement", "fit_contact"), True
+    raise ValueError(f"found '{text}', allowed is fit")
+
+
 def _fix(text: str) -> tuple[Path, Any]:
     name, _, value = text.partition("=")
     with suppress(ValueError):
@@ -105,6 +123,10 @@ GROUPS: dict[str, list[tuple[str, str, Key, str]]] = {
             "[1 for a compliance or a modulus]",
         ),
         (
+            *("--ramp", "DURATION", _ramp),
+            "within which it was reached, linearly and from its start on, as in 80ms [at once]",
+        ),
+        (
             *("--load", "COLUMN", "measurement.load"),
             "instead of --hold: column of the same, as recorded",
         ),
@@ -113,6 +135,7 @@ GROUPS: dict[str, list[tuple[str, str, Key, str]]] = {
             "of a sphere that indents the sample, as in '2.5 um': force or "
             "indentation is read, the other is of --hold or --load",
         ),
+        ("--contact", "fit", _contact, "fit where the tip touches the sample, too [at depth 0]"),
         ("--start", "SECONDS", _start, "the protocol's start on the clock, or fit to fit it [0]"),
         (
             *("--from", "PLACE", "measurement.from_s"),

@@ -28,6 +28,7 @@ from biogrip.config.loading import load, read_config_of, read_configs, trace_def
 from biogrip.config.messages import checked, with_numbers
 from biogrip.config.source import (
     HOLD,
+    RAMP,
     KeyPath,
     Source,
     keys_in,
@@ -195,7 +196,7 @@ def _source(setting: Setting, known: set[KeyPath], merged: Mapping[str, Any]) ->
     if path[0] == "measurement" and "sphere" in merged["measurement"]:
         path = (path[0], *(_BY_SPHERE.get(str(key), key) for key in path[1:]))
     held = {"protocol": merged["protocol"]}
-    keys = keys_in(held) if path in (HOLD, LOAD) else keys_in(setting.value, path)
+    keys = keys_in(held) if path in (HOLD, RAMP, LOAD) else keys_in(setting.value, path)
     above = [path[:length] for length in range(1, len(path)) if path[:length] not in known]
     return setting.by, dict.fromkeys([*above, path, *keys])
 
@@ -210,12 +211,18 @@ def _with_instrument(
     is read is relative to it. Where it follows from the trace, this is returned, too, and what was
     controlled, if it was recorded, see `Experiment.record`.
     """
-    blocks = {name: block for name, block in merged.items() if name != HOLD[0]}
+    blocks = {name: block for name, block in merged.items() if name not in (*HOLD, *RAMP)}
     if not isinstance(merged["measurement"], dict):
         return blocks, None, None
-    held, by = merged.get(HOLD[0]), _place_of_hold(asked)
+    held, by, ramp_s = merged.get(HOLD[0]), _place_of(HOLD, asked), merged.get(RAMP[0], 0.0)
     instrument = _instrument(merged, given)
     measurement = _measurement_of(asked, merged["measurement"], instrument)
+    if ramp_s and (instrument.sweeps or measurement.get(LOAD[-1]) or "protocol" in given):
+        raise BiogripError(f"{_place_of(RAMP, asked)}: goes with --hold; leave it out.")
+    if ramp_s and instrument.relative:
+        # What a rising strain is divided by, that of its end or its own, nothing tells.
+        risen_s = (measurement.get("start_s") or 0.0) + ramp_s
+        measurement["from_s"] = max(measurement.get("from_s") or risen_s, risen_s)
     kind = given.get("instrument", instrument.kind)
     blocks |= {"instrument": kind, "measurement": measurement}
     block = checked(MeasurementBlock, measurement)[0]
@@ -245,22 +252,28 @@ def _with_instrument(
     start_s = measurement.get("start_s")
     if recording.load is None:
         lasts_s = _duration(recording, start_s)
-        return _with_hold(blocks, controlled, level, lasts_s), recording, None
+        if ramp_s >= lasts_s:
+            text = f"found {ramp_s:g} s, allowed is less than the trace's {lasts_s:g} s"
+            raise BiogripError(f"{_place_of(RAMP, asked)}: {text}.")
+        return _with_hold(blocks, controlled, level, lasts_s, ramp_s), recording, None
+    touching = recording.load
+    if block.tip_power is not None:
+        touching = np.maximum(touching, (-np.inf, 0.0))
     if start_s is None:
-        start_s = _start_of(recording.load)
+        start_s = _start_of(touching)
         blocks["measurement"] = measurement | {"start_s": start_s or None}
     record = _from(recording.load, start_s)
-    largest = float(max(record[:, 1], key=abs))
+    largest = float(max(touching[:, 1], key=abs))
     if instrument.relative and largest:
         record[:, 1] /= largest
     return _with_hold(blocks, controlled, largest, float(record[-1, 0])), recording, record
 
 
-def _place_of_hold(asked: Asked) -> str:
-    """Return the option, or the cell of a table, that says what was held."""
+def _place_of(path: KeyPath, asked: Asked) -> str:
+    """Return the option, or the cell of a table, that says what was held, or how it was reached."""
     row = "" if asked.place == TRACE else f"{asked.place}: "
-    said = (setting.by for setting in asked.settings[::-1] if setting.path == HOLD)
-    return next(said, f"{row}--hold")
+    said = (setting.by for setting in asked.settings[::-1] if setting.path == path)
+    return next(said, f"{row}{path[0]}")
 
 
 def _measurement_of(
@@ -275,11 +288,18 @@ def _measurement_of(
 
 
 def _with_hold(
-    blocks: Mapping[str, Any], controlled: Channel, level: float = 1.0, lasts_s: float = 1.0
+    blocks: Mapping[str, Any],
+    controlled: Channel,
+    level: float = 1.0,
+    lasts_s: float = 1.0,
+    ramp_s: float = 0.0,
 ) -> dict[str, Any]:
-    """Return the blocks with a protocol of one hold."""
-    phase = {"duration_s": lasts_s, controlled.column: level}
-    return {**blocks, "protocol": {"phases": [phase]}}
+    """Return the blocks with a protocol of one hold, that is reached at once or linearly."""
+    column = controlled.column
+    phases = [{"duration_s": lasts_s - ramp_s, column: level}]
+    if ramp_s:
+        phases.insert(0, {"duration_s": ramp_s, column: 0.0, f"to_{column}": level})
+    return {**blocks, "protocol": {"phases": phases}}
 
 
 def _duration(recording: Recording, start_s: float | None) -> float:

@@ -29,7 +29,7 @@ from biogrip.traces.columns import listed, number_and_unit, place, trace_file_pr
 from biogrip.traces.measurement_block import READINGS
 
 _FILES = ("file", "filename", "filepath", "path", "trace", "tracefile")
-_OF_NUMBERS = ("hold", "noise", "noise_share", "start", "from", "until")
+_OF_NUMBERS = ("hold", "ramp", "noise", "noise_share", "start", "from", "until")
 _OF_WORDS = ("noise_model", "offset", "drift", "reading", "sphere")
 # Other names of what is held.
 _HELD = ("held", "load", "pressure_Pa", "indentation_m")

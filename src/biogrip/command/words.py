@@ -22,6 +22,8 @@ _SWEEPS = "oscillation"
 _LINES = 5
 # Most names of traces that are refused for what another one is.
 _MOST_NAMED = 5
+# Share of a quantity below which no error of the instrument is worth a line.
+_LEAST_MOVE = 1e-4
 _NUMBER = re.compile(r"\d[\d.e+-]*")
 # What the notes of a weight do to the fit.
 _MEANS = {
@@ -47,7 +49,7 @@ def in_words(found: Mapping[str, Any]) -> str:
     lines += [] if rejected else without_model_in_words(found)
     lines += one_sided_in_words([found], foremost(found))
     lines += [found["limits"]] if not rejected else []
-    lines += [each["words"] for each in found["hidden"][:1]]
+    lines += moves_in_words(found)
     lines += [trade["words"] for trade in found["trades"]]
     lines += fitted_in_words(found)
     lines += [f"Note: {visible(text)}" for text in further_notes(found)]
@@ -67,6 +69,30 @@ def without_model_in_words(found: Mapping[str, Any]) -> list[str]:
     width = max(len(each["quantity"]) for each in told)
     lines = (f"  {each['quantity']:<{width}}  {each['in_words']}" for each in told)
     return [f"Any linear sample that fits, whatever its model (least misfit {left}), has:", *lines]
+
+
+def rows_of_moves(found: Mapping[str, Any]) -> list[tuple[str, dict[str, float]]]:
+    """Return clauses on errors of the instrument, and by which share each moves what is shown."""
+    shown, of_any = {each["quantity"] for each in foremost(found)}, found["without_model"]["moves"]
+    rows: dict[str, dict[str, float]] = {}
+    for move in [*found["moves"], *of_any]:
+        kept = move in found["moves"]
+        changes = {name: by for name, by in move["changes"].items() if kept or name in shown}
+        rows.setdefault(move["words"], {}).update(changes)
+    return [*rows.items()]
+
+
+def moves_in_words(found: Mapping[str, Any]) -> list[str]:
+    """Return a line on the error that moves a quantity most, of the model's and of any sample's."""
+    said, of_model = [], {each["quantity"] for each in found["quantities"]}
+    every = [(by, name, words) for words, row in rows_of_moves(found) for name, by in row.items()]
+    for by_model in (True, False):
+        chosen = [each for each in every if (each[1] in of_model) == by_model]
+        by, name, words = max(chosen, key=lambda it: abs(it[0]), default=(0.0, "", ""))
+        if abs(by) > _LEAST_MOVE:
+            way = f"{'falls' if by < 0 else 'rises'} by {plain(100 * abs(by), 2)} %"
+            said.append(f"{name} {way} if {words}")
+    return [f"{'; '.join(said)}."] if said else []
 
 
 def foremost(found: Mapping[str, Any]) -> list[Mapping[str, Any]]:
@@ -122,6 +148,11 @@ def fitted_in_words(found: Mapping[str, Any]) -> list[str]:
     if "onset_s" in found:
         when = instant(found["onset_s"], *found["onset_limits_s"])
         lines.append(f"The protocol starts at {when} of the clock, as fitted.")
+    if "contact_m" in found:
+        depths = (1e9 * it for it in (found["contact_m"], *found["contact_limits_m"]))
+        value, low, high = (f"{depth:.3g}" for depth in depths)
+        text = f"The tip is deeper than recorded by {value} nm ({low} to {high}), as fitted."
+        lines.append(text)
     if "offset_rad" in found:
         lines.append(f"Offset of the instrument: {in_unit(found['offset_rad'], found)}")
     if "drift_rad_per_s" in found:

@@ -157,13 +157,20 @@ class AnySampleFit:
 
     def left_of_readings(self) -> tuple[Array, Array]:
         """Return what it leaves of the readings, (n_samples,), and a basis of what it absorbs."""
-        own, lags, residuals = self.amplitudes > 0, self.lags, self.lags.residuals
-        trace, course = residuals.trace, residuals.course
-        shown = mode_responses(-lags.rates[own][None], course, trace.time_s)[0]
-        shown *= (1.0 if course.deforms else -1.0) / lags.sizes[own, None]
-        shown = trace.condensed.cleared(shown)
+        trace, own = self.lags.residuals.trace, self.amplitudes > 0
+        shown = trace.condensed.cleared(self._shown(self.lags.residuals))
         residual: Array = trace.cleared - self.amplitudes[own] @ shown
-        return residual, absorbed(np.vstack((shown, trace.condensed.nuisance)))
+        return residual, absorbed(np.vstack((shown, trace.condensed.taken)))
+
+    def response(self, residuals: Residuals) -> Array:
+        """Return what it shows, (n_samples,), under the protocol and at the times of residuals."""
+        return self.amplitudes[self.amplitudes > 0] @ self._shown(residuals)
+
+    def _shown(self, residuals: Residuals) -> Array:
+        """Return the same of unit amplitudes of the lags that it has, (n, n_samples)."""
+        course, own = residuals.course, self.amplitudes > 0
+        shown = mode_responses(-self.lags.rates[own][None], course, residuals.trace.time_s)[0]
+        return shown * ((1.0 if course.deforms else -1.0) / self.lags.sizes[own, None])
 
 
 def count_lags(chosen: BoolArray) -> int:

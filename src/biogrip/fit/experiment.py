@@ -13,7 +13,7 @@ from biogrip.fit.search_range import GeneRange
 from biogrip.physics.condensed import Condensed, SweptRows
 from biogrip.physics.fractional import LONGEST_S, on_clock
 from biogrip.physics.gripper import Gripper
-from biogrip.physics.instruments import Instrument
+from biogrip.physics.instruments import Instrument, in_contact
 from biogrip.physics.models import Sample
 from biogrip.physics.noise import (
     WEIGHTED,
@@ -72,6 +72,15 @@ class Experiment:
     record: Array | None = field(default=None, compare=False)
     """Times from the start and what was controlled at them, (n, 2), where that was recorded, see
     `biogrip.physics.protocol`; the phases are then a hold as long and as high."""
+    tip_power: float | None = None
+    """Exponent of the depth of which the record has powers, with their sign before the contact."""
+    deeper: float = 0.0
+    """By how much a tip is deeper than recorded, in the depth's unit (`in_contact`)."""
+    fit_contact: bool = False
+    """True if that is fitted along (`biogrip.identify.contact`)."""
+    load_errors: Array | None = field(default=None, compare=False)
+    """Directions in which a record that was smoothed may be off, (n_directions, n), each as long as
+    its standard deviation."""
     undeclared: frozenset[str] = frozenset()
     """Which of ``offset`` and ``drift`` nothing is said of: a noise model brings them along."""
     given_ranges: frozenset[str] = frozenset()
@@ -101,7 +110,11 @@ class Experiment:
         if self.instrument.sweeps:
             return SWEEP
         if self.record is not None:
-            return follow_rows(*self.record.T, deforms=self.instrument.deforms)
+            time_s, loads = self.record.T
+            if self.tip_power is not None:
+                loads = in_contact(loads, self.tip_power, self.deeper)
+            course = follow_rows(time_s, loads, deforms=self.instrument.deforms)
+            return replace(course, smoothed=self.load_errors is not None)
         return join_phases(self.phases, deforms=self.instrument.deforms)
 
     @cached_property
@@ -124,7 +137,8 @@ class Experiment:
         """Leave out noise model, gripper uncertainty, and ranges neither it nor `others` use."""
         chosen = {p.range_name for model in (self.model, *others) for p in model.parameters}
         ranges = {name: genes for name, genes in self.ranges.items() if name in chosen}
-        return replace(self, ranges=ranges, coloured=False, uncertainty={})
+        exact = replace(self, uncertainty={}, load_errors=None, fit_contact=False)
+        return replace(exact, ranges=ranges, coloured=False)
 
     def weighted(self, sd: Array | None, *, known: bool = True) -> "Experiment":
         """Divide the readings of a trace by their standard deviations, if these are known.
@@ -170,7 +184,8 @@ class Experiment:
     @property
     def plain(self) -> bool:
         """True if noise is assumed to be white, and gripper and protocol to be known exactly."""
-        return not (self.coloured or self.uncertain)
+        uncertain = self.uncertain or self.fit_contact or self.load_errors is not None
+        return not (self.coloured or uncertain)
 
     def of(
         self,

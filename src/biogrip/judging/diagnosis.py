@@ -37,10 +37,10 @@ from biogrip.judging.doubts import (
     compute_status,
     examine_residuals,
 )
-from biogrip.judging.hidden import Hidden, find_hidden
 from biogrip.judging.likelihood import Likelihood, check_rows, make_likelihood
 from biogrip.judging.quantities import characteristic_times, parameters_and_sum
 from biogrip.judging.verdicts import DETERMINED, Finding, Trade, compute_findings, find_trade_offs
+from biogrip.judging.what_moves import Move, find_moves
 from biogrip.judging.without_model import KINDS, WithoutModel, tell_without_model, times_told
 from biogrip.physics.sample_model import C_P
 from biogrip.physics.simulation import Grip
@@ -110,10 +110,12 @@ class Diagnosis:
         return replace(found, told=[]) if hopeless else found
 
     @cached_property
-    def hidden(self) -> list[Hidden]:
-        """Errors that the trace could hide, none of a rejected fit, see `find_hidden`."""
-        none = self.status == REJECTED or self.likelihood.problem.residuals.course.sweeps
-        return [] if none else find_hidden(self.likelihood, self.findings)
+    def moves(self) -> list[Move]:
+        """What errors of the instrument do to determined quantities, none of a rejected fit."""
+        of = [each.quantity for each in self.findings if each.verdict == DETERMINED]
+        if self.status == REJECTED or not of:
+            return []
+        return find_moves(self.likelihood, of, start_fitted=self.onset_limits_s is not None)
 
     def __repr__(self) -> str:
         """Return status and verdicts, a line each."""

@@ -34,7 +34,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.special import betainc, betaincc, betaincinv, fdtrc, ndtr, ndtri, pdtrc, stdtr
+from scipy.special import betainc, betaincc, fdtrc, ndtr, ndtri, pdtrc, stdtr
 
 import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray, IntArray
@@ -76,6 +76,18 @@ def correlated(residual: Array, basis: Array) -> tuple[float, float]:
     return 1 - observed * free / first, chance
 
 
+def is_still(values: Array) -> bool:
+    """Return True if values only scatter about their mean, (n,): neither rise nor wander.
+
+    Of too few no trend is told, unless they are all the same.
+    """
+    if np.ptp(values) == 0:
+        return True
+    apart, basis = values - np.mean(values), np.full((1, len(values)), len(values) ** -0.5)
+    chances = correlated(apart, basis)[1], wandering(apart, basis)
+    return len(values) >= levels.FEWEST_STILL and min(chances) >= levels.FALSE_ALARM
+
+
 def wandering(residual: Array, basis: Array) -> float:
     """Return the chance of means over stretches of white noise that scatter as much.
 
@@ -102,20 +114,6 @@ def wandering(residual: Array, basis: Array) -> float:
         return 1.0
     # The share of the rest is small where that of the means is large.
     return _chance_of_less(1 - observed, free - first, free - 2 * first + second, free, 1.0)
-
-
-def averaged(basis: Array) -> Array:
-    """Return orthonormal rows of means over stretches that a fit does not absorb."""
-    n = basis.shape[1]
-    count = min(_STRETCHES, n // _SHORTEST)
-    if count < 2:
-        return np.zeros((0, n))
-    rows = np.zeros((count, n))
-    for row, part in zip(rows, np.array_split(np.arange(n), count), strict=True):
-        row[part] = len(part) ** -0.5
-    rest = without(basis, rows)
-    _, shares, found = np.linalg.svd(rest, full_matrices=False)
-    return found[shares > levels.TOLD]
 
 
 def _chance_of_less(observed: float, first: float, second: float, free: int, most: float) -> float:
@@ -303,14 +301,6 @@ class Steps:
         products = np.einsum("ij,ij->i", self.whole[:-1], self.whole[1:])
         products -= np.einsum("ij,ij->i", self.taken[:-1], self.taken[1:])
         return np.clip(1 - products / (self.norms[:-1] * self.norms[1:]), 0.0, 1.0)
-
-    def critical(self, level: float) -> float:
-        """Return the distance in standard deviations at which a scan's chance is a level."""
-        from scipy.optimize import brentq
-
-        most = float(betaincinv(0.5, 0.5 * (self.freedom - 1), 1 - 1e-12))
-        share = brentq(lambda share: self.chance(share) - level, 1e-9, most)
-        return float(np.sqrt(share * self.freedom))
 
 
 def _density(level: Array | float) -> Array:

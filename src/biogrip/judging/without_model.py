@@ -26,7 +26,7 @@ References
 
 import math
 from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from itertools import pairwise
 from typing import Any
@@ -39,6 +39,7 @@ from biogrip.arrays import Array, BoolArray
 from biogrip.digits import plain, with_limits
 from biogrip.fit.any_sample import AnySampleFit, Lags, count_lags, fit_any_sample
 from biogrip.judging.verdicts import verdict_of
+from biogrip.judging.what_moves import Move, as_moves, find_mistakes
 from biogrip.judging.whiteness import as_correlated, correlated
 from biogrip.physics.residuals import Residuals
 
@@ -133,6 +134,8 @@ class WithoutModel:
     """False if no linear sample gives this trace, for what the best leaves is no noise."""
     covered_s: tuple[float, float]
     """From when to when after a step there are readings, and so limits on either side."""
+    moves: list[Move] = field(default_factory=list)
+    """What errors of the instrument do to quantities that have a value."""
 
     def widened(self, others: Sequence["WithoutModel"]) -> "WithoutModel":
         """Return it with limits that hold those of others, too, as of other starts."""
@@ -152,6 +155,7 @@ class WithoutModel:
             "times_noise": self.times_noise,
             "misfit_rad": self.misfit,
             "covered_s": list(self.covered_s),
+            "moves": [asdict(move) for move in self.moves],
             "quantities": [
                 {**asdict(each), "verdict": each.verdict, "in_words": each.words()}
                 for each in self.told
@@ -191,9 +195,29 @@ def tell_without_model(
         sd = fit.sd * math.sqrt(free / independent)
     root = partial(_root, confidence, freedom, float(sd / residuals.noise_scale))
     times_s = at_s or times_told(*fit.lags.covered_s)
-    quantities = (each for each in _quantities(residuals, fit.lags, times_s) if each.kind in kinds)
-    told = [_find_limits(fit, each, root) for each in quantities]
-    return WithoutModel(told, fit.misfit, times, is_linear, fit.lags.covered_s)
+    chosen = [each for each in _quantities(residuals, fit.lags, times_s) if each.kind in kinds]
+    told = [_find_limits(fit, each, root) for each in chosen]
+    moves = _moves(fit, [own for own, it in zip(chosen, told, strict=True) if it.value])
+    return WithoutModel(told, fit.misfit, times, is_linear, fit.lags.covered_s, moves)
+
+
+def _moves(fit: AnySampleFit, quantities: Sequence["_Functional"]) -> list[Move]:
+    """Return what errors of the instrument do to quantities.
+
+    It is half the difference of fits with the error added to the readings and taken off.
+    """
+    residuals = fit.lags.residuals
+    trace, mistakes = residuals.trace, list(find_mistakes(residuals, fit.response))
+
+    def values(added: Array) -> Array:
+        changed = replace(trace, readings=trace.readings + added)
+        other = fit_any_sample(replace(residuals, trace=changed))
+        return np.array([quantity.of(other) for quantity in quantities])
+
+    given = np.array([quantity.of(fit) for quantity in quantities])
+    moved = (values(mistake.change) - values(-mistake.change) for mistake in mistakes)
+    changes = np.array([0.5 * each / given for each in moved]).T
+    return as_moves(mistakes, [quantity.name for quantity in quantities], changes)
 
 
 def _root(confidence: float, freedom: float, sd: float, more: int) -> float:
@@ -250,6 +274,12 @@ class _Functional:
         at_s, shown = self.at_s or 0.0, (lags.rates <= self.fastest) / lags.sizes
         below = self.below(at_s, lags.rates) if self.below else np.zeros_like(shown)
         return self.above(at_s, lags.rates) * shown, below * shown
+
+    def of(self, fit: AnySampleFit) -> float:
+        """Return what is told of a fit, NaN where it has none."""
+        above, below = (float(added @ fit.amplitudes) for added in self.added(fit.lags))
+        value = above / below if below else above if self.below is None else math.nan
+        return self.turned(value) if self.turned and value else value
 
 
 def _find_limits(

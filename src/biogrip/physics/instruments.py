@@ -182,6 +182,15 @@ def under_sphere(instrument: Instrument, radius_m: float) -> Instrument:
     return replace(instrument, controlled=of[instrument.controlled], read=of[instrument.read])
 
 
+def in_contact(loads: Any, power: float, deeper: float) -> Any:
+    """Return powers of depths that are deeper by some unit, from powers of depths with their sign.
+
+    Before its contact a tip neither presses nor indents.
+    """
+    depths = _raised(loads, 1 / power) + deeper
+    return _raised(0.5 * (depths + abs(depths)), power)
+
+
 def of_kind(kind: str) -> list[Instrument]:
     """Return the instruments of a kind."""
     return [each for each in INSTRUMENTS.values() if each.kind == kind]

@@ -145,6 +145,10 @@ class MeasurementBlock(Block):
     """Radius of a sphere that indents the sample, with its unit, as `2.5 um`. The column of the
     stress then has its force, and that of the strain its indentation, and moduli are Young's, by
     Hertz's contact with an incompressible sample."""
+    fit_contact: bool = False
+    """If true, fit the depth along at which a tip touches the sample, as where its contact was set
+    by eye; the limits allow for its uncertainty. It takes readings of the approach. By default
+    false."""
     average_repeated: bool = False
     """If true, average the readings of equal times, as a rounded clock writes them."""
     from_s: Annotated[float | None, Field(ge=-1e12, le=1e12)] = None
@@ -199,6 +203,13 @@ class MeasurementBlock(Block):
         """The instrument of a recorded trace, with the units that its columns may have."""
         instrument, radius_m = INSTRUMENTS[self.readings[0]], length_m(self.sphere or "")
         return under_sphere(instrument, radius_m) if radius_m else instrument
+
+    @property
+    def tip_power(self) -> float | None:
+        """Exponent of a recorded depth of a tip; None if none was recorded."""
+        recorded = self.sphere is not None and self.load is not None
+        controlled = self.instrument.controlled if recorded else None
+        return controlled.power if controlled and controlled.name == STRAIN.name else None
 
     @property
     def partner(self) -> Channel | None:
@@ -310,6 +321,9 @@ class MeasurementBlock(Block):
             if name not in (STRESS.name, STRAIN.name):
                 yield ("sphere",), f"goes with a force or an indentation, not with {name}."
                 return
+        if self.fit_contact and self.tip_power is None:
+            text = "takes the shape of a tip, and a recorded depth (--load)"
+            yield ("fit_contact",), f"{text}: of a dwell alone nothing tells it."
         instrument = self.instrument
         for key, of in (("reading_unit", instrument.read), ("load_unit", instrument.controlled)):
             unit = getattr(self, key)

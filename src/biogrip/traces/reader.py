@@ -128,8 +128,7 @@ class Recording:
         if self.load_noise:
             said.append(
                 f"Smoothed out of {self.read.load}, since the readings do not follow it: what "
-                f"scatters from row to row by {plain(100 * self.load_noise, 2)} % of the largest. "
-                "What is left counts as exact."
+                f"scatters from row to row by {plain(100 * self.load_noise, 2)} % of the largest."
             )
         if "unclear" in form:
             said.append(
@@ -486,8 +485,7 @@ def _load(
     _check_order(path, columns, history[:, 0], lines)
     time_s = history[:, 0] * AXES[columns.axis][units[0]]
     sizes = columns.instrument.controlled.in_si(history[:, 1], units[-1])
-    # Before its contact a sphere neither presses nor indents.
-    return np.column_stack((time_s, np.maximum(sizes, 0.0) if columns.sphere else sizes))
+    return np.column_stack((time_s, sizes))
 
 
 def _averaged(values: Array, lines: IntArray, first_sd: int = 2) -> tuple[Array, IntArray, int]:
