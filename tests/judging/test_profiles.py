@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array, IntArray
-from biogrip.fit.least_squares import FAIR, FINE
+from biogrip.fit.least_squares import FINE
 from biogrip.fit.levenberg_marquardt import Normal
 from biogrip.fit.trace_fit import TraceFit
 from biogrip.judging import profiles
@@ -31,7 +31,6 @@ from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.protocol import hold
 from biogrip.physics.sample_model import with_fixed
 from biogrip_study.stages.judgement import judge_quantities
-from tests.helpers.default import seen
 from tests.helpers.identified import told
 from tests.helpers.problems import (
     GRIPPER,
