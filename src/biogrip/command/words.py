@@ -300,12 +300,6 @@ REFERENCE = (
 )
 """How biogrip is cited, as in CITATION.cff."""
 
-_INSTRUMENTS = {
-    "gripper": "The {} of an arm of a microgripper was recorded",
-    "creep": "In creep the {} was recorded",
-    "relaxation": "In relaxation the {} was recorded",
-    "oscillation": "In oscillation storage and loss moduli were recorded over frequency",
-}
 _MOST_PHASES, _MOST_REFUSED = 4, 3
 _LATEX_OF = str.maketrans(
     {
@@ -319,10 +313,9 @@ _POWER = re.compile(r"(\d[\d.]*)e([+-]\d+)\b")
 
 def set_up_in_words(found: Mapping[str, Any]) -> list[str]:
     """Return sentences on instrument, protocol, model, noise, limits and conditions of a trace."""
-    reads, assumed = found["reads"]["quantity"], found["assumed"]
-    under = "" if INSTRUMENTS[reads].sweeps else f" under {_protocol(found)}"
-    what = _INSTRUMENTS[found["instrument"]].format(reads.replace("_", " "))
-    said = [f"{what}{under}."]
+    instrument, assumed = INSTRUMENTS[found["reads"]["quantity"]], found["assumed"]
+    under = "" if instrument.sweeps else f" under {_protocol(found)}"
+    said = [f"{instrument.in_words}{under}."]
     if sphere := assumed["measurement"].get("sphere"):
         said.append(
             f"By Hertz's contact with a sphere of radius R = {sphere}, a force F is the stress "

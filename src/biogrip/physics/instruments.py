@@ -75,11 +75,19 @@ class Instrument:
     read: Channel
     """What a trace is of."""
     stiffness: str = "N/m"
-    """Unit of a sample's stiffnesses: Pa if they are moduli, none if these are shares."""
+    """Unit of a sample's stiffnesses: Pa if they are moduli, none if these are shares; those of
+    its dampings and compliances follow."""
     relative: bool = False
     """True if what is read is divided by the largest controlled value."""
     partners: tuple[Channel, ...] = ()
     """What may be read beside it at each frequency of a sweep, so that both tell both moduli."""
+    sentence: str = "In {kind} the {read} was recorded"
+    """What a paper says of it."""
+
+    @property
+    def in_words(self) -> str:
+        """What a paper says of it, up to what was controlled."""
+        return self.sentence.format(kind=self.kind, read=self.read.name.replace("_", " "))
 
     @property
     def deforms(self) -> bool:
@@ -106,7 +114,10 @@ ROTATION = Channel(
     {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": math.pi / 180},
     "closing rotation",
 )
-GRIPPER = Instrument("gripper", TORQUE, ROTATION)
+GRIPPER = Instrument(
+    *("gripper", TORQUE, ROTATION),
+    sentence="The {read} of an arm of a microgripper was recorded",
+)
 """Its read rotation is the closing one of its left arm."""
 
 STRESS_UNITS = {
@@ -138,6 +149,8 @@ _STIFF_LOSSES = Channel("loss", "N/m", _STIFFNESSES), PHASE, LOSS_FACTOR
 _MODULI = [Channel(name, "Pa", STRESS_UNITS) for name in ("storage", "complex_modulus")]
 _STIFF = Channel("storage_stiffness", "N/m", _STIFFNESSES)
 
+_READ_BOTH = "In oscillation storage and loss moduli were recorded over frequency"
+
 INSTRUMENTS: dict[str, Instrument] = {
     instrument.read.name: instrument
     for instrument in (
@@ -149,8 +162,8 @@ INSTRUMENTS: dict[str, Instrument] = {
         Instrument("relaxation", STRAIN, STRESS, stiffness="Pa"),
         Instrument("relaxation", STRAIN, MODULUS, stiffness="Pa", relative=True),
         Instrument("relaxation", STRAIN, RELATIVE_MODULUS, stiffness="", relative=True),
-        *(Instrument("oscillation", STRAIN, each, "Pa", True, _LOSSES) for each in _MODULI),
-        Instrument("oscillation", DISPLACEMENT, _STIFF, "N/m", True, _STIFF_LOSSES),
+        *(Instrument("oscillation", STRAIN, of, "Pa", True, _LOSSES, _READ_BOTH) for of in _MODULI),
+        Instrument("oscillation", DISPLACEMENT, _STIFF, "N/m", True, _STIFF_LOSSES, _READ_BOTH),
     )
 }
 """Instruments by the name of the quantity that they read."""
