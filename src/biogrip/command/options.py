@@ -36,6 +36,22 @@ def _reading(text: str) -> tuple[Path, Any]:
     return ("measurement", text if text in INSTRUMENTS else "rotation"), text
 
 
+def _block(text: str) -> tuple[Path, Any]:
+    with suppress(ValueError):
+        numbers = [int(number) for number in text.split(",")]
+        return ("measurement", "block"), numbers if numbers[1:] else numbers[0]
+    raise ValueError(f"found '{text}', allowed is a number, or several as in 1,2")
+
+
+def _rows(text: str) -> tuple[Path, Any]:
+    column, _, value = text.rpartition("=")
+    if not (column and value):
+        raise ValueError(f"found '{text}', allowed is COLUMN=VALUE, as in 'T (C)=20'")
+    with suppress(ValueError):
+        return ("measurement", "rows", column), float(value)
+    return ("measurement", "rows", column), value
+
+
 def _start(text: str) -> tuple[Path, Any]:
     if text == "fit":
         return ("measurement", "fit_start"), True
@@ -96,6 +112,14 @@ GROUPS: dict[str, list[tuple[str, str, Key, str]]] = {
         ),
         ("--time", "COLUMN", "measurement.time", "of times [time_s]"),
         ("--frequency", "COLUMN", "measurement.frequency", "of frequencies, of a sweep"),
+        (
+            *("--block", "N,...", _block),
+            "number of the table to read, of several in the file; 1,2 joins two that are one test",
+        ),
+        (
+            *("--rows", "COLUMN=VALUE", _rows),
+            "use only rows with this in another column, as in 'T (C)=20'; repeatable",
+        ),
     ],
     "what was done": [
         (
@@ -145,7 +169,7 @@ GROUPS: dict[str, list[tuple[str, str, Key, str]]] = {
     "any other key of the config": [
         (
             *("--set", "KEY=VALUE", _any_key),
-            "as in measurement.time_unit=ms or measurement.block=2, YAML; repeatable",
+            "as in measurement.time_unit=ms or measurement.scale=-1, YAML; repeatable",
         )
     ],
 }

@@ -11,7 +11,7 @@ from typing import Annotated
 
 from pydantic import BeforeValidator, Field, Tag
 
-from biogrip.keys import BY_KIND, Block, Complaint, OneOf
+from biogrip.keys import BY_KIND, Block, Complaint, Distinct, OneOf
 from biogrip.physics.instruments import (
     INSTRUMENTS,
     PARTNERS,
@@ -55,7 +55,7 @@ _BY_SET = {
     "rotation_unit": "UNIT",
     "reading_unit": "UNIT",
     "load_unit": "UNIT",
-    "block": "N",
+    "load_scale": "-1",
     "average_repeated": "true",
     "scale": "-1",
 }
@@ -69,6 +69,13 @@ def _unit(allowed: Mapping[str, float]) -> BeforeValidator:
 
 
 _Name = Annotated[str | None, Field(min_length=1, max_length=4000)]
+
+_Block = Annotated[int, Field(ge=1, le=1_000_000)]
+_Blocks = Annotated[
+    Annotated[_Block, Tag("a number")]
+    | Annotated[Distinct[tuple[_Block, ...]], Field(min_length=1, max_length=1000), Tag("a list")],
+    BY_KIND,
+]
 
 _Value = Annotated[Annotated[float, Tag("a number")] | Annotated[str, Tag("text")], BY_KIND]
 
@@ -129,8 +136,10 @@ class MeasurementBlock(Block):
     reading_unit: Annotated[str | None, Field(min_length=1, max_length=20)] = None
     """Unit of what another instrument reads, where the column's name does not end in it; of strains
     by default 1."""
-    block: Annotated[int | None, Field(ge=1, le=1_000_000)] = None
-    """Number of the block to read, where several tables follow one another in the file."""
+    block: _Blocks | None = None
+    """Number of the block to read, where several tables follow one another in the file; or a list,
+    as `[1, 2]`, of blocks that are one test, such as creep and recovery, to join in this order.
+    Times that begin anew in one go on from the last one before."""
     rows: Annotated[Mapping[str, _Value], Field(min_length=1)] | None = None
     """Values of other columns in the rows to use, as `{Segment: dwell}`; the others are left
     out."""
@@ -216,6 +225,20 @@ class MeasurementBlock(Block):
         partner = [self.partner.name] if self.partner else []
         keys = (self.axis, self.readings[0], *partner, "sd", "loss_sd", "load")
         return {key: name for key in keys if (name := getattr(self, key)) is not None}
+
+    @property
+    def blocks(self) -> tuple[int, ...]:
+        """Numbers of the blocks to read, in their order; none if nothing says which."""
+        return (self.block,) if isinstance(self.block, int) else self.block or ()
+
+    def units_of(self, key: str) -> Mapping[str, float]:
+        """Return the units that a column of `named` may have."""
+        if key == self.axis:
+            return AXES[key]
+        if key == "load":
+            return self.instrument.controlled.units
+        partner = self.partner
+        return partner.units if partner and key == partner.name else self.instrument.read.units
 
     @property
     def axis_column(self) -> str:
