@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from biogrip import __version__
-from biogrip.command.options import GROUPS, Setting
+from biogrip.command.options import GROUPS, REPLACED, Setting
 from biogrip.errors import BiogripError, nearest
 from biogrip.terminal import visible, visible_lines
 
@@ -74,7 +74,10 @@ class _Parser(argparse.ArgumentParser):
         """Refuse unknown options with the usage of their command, and the nearest that there is."""
         found, unknown = super().parse_known_args(args, namespace)
         if unknown:
-            near = nearest(unknown[0].partition("=")[0], self._option_string_actions)
+            option = unknown[0].partition("=")[0]
+            if new := REPLACED.get(option.removeprefix("--")):
+                self.error(f"{option}: is now --{new}, as in --{new} 'sphere 2.5 um'.")
+            near = nearest(option, self._option_string_actions)
             self.error(f"unrecognized arguments: {' '.join(unknown)}.{near}")
         return found, unknown
 
@@ -182,7 +185,7 @@ def _add_identify(commands: Any) -> None:
         "identify cell.csv --config my_gripper.yaml --model liquid_drop --report page.html",
         "identify creep.csv --reading 'strain=Strain [%]' --time 'Time [s]' --hold 5Pa --model sls",
         "identify afm.txt --reading 'force=Load (uN)' --time 'Time (s)' "
-        "--load 'Indentation (nm)' --sphere '25 um' --model sls",
+        "--load 'Indentation (nm)' --shape 'sphere 25 um' --model sls",
         """identify sweep.csv --reading "storage=G' (Pa)" --reading "loss=G'' (Pa)" """
         "--frequency 'f (Hz)' --model power_law",
         "identify cells.tsv --config my_gripper.yaml --csv found.csv",

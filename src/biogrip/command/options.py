@@ -72,6 +72,25 @@ def _hold(text: str) -> tuple[Path, Any]:
     raise ValueError(f"found '{text}', {form}")
 
 
+def _share(text: str) -> tuple[Path, Any]:
+    from biogrip.traces.columns import number_and_unit
+
+    number, unit = number_and_unit(text)
+    if unit in ("", "%"):
+        return ("measurement", "noise_share"), number / 100 if unit else number
+    raise ValueError(f"found '{text}', allowed is a share, as in 0.02 or 2%")
+
+
+def _phase_sd(text: str) -> tuple[Path, Any]:
+    from biogrip.physics.instruments import PHASE
+    from biogrip.traces.columns import known_unit, number_and_unit
+
+    number, written = number_and_unit(text)
+    if unit := known_unit(written, PHASE.units):
+        return ("measurement", "phase_sd_rad"), number * PHASE.units[unit]
+    raise ValueError(f"found '{text}', allowed is an angle, as in 0.3deg or 5mrad")
+
+
 def _fix(text: str) -> tuple[Path, Any]:
     name, _, value = text.partition("=")
     with suppress(ValueError):
@@ -133,9 +152,9 @@ GROUPS: dict[str, list[tuple[str, str, Key, str]]] = {
             "instead of --hold: column of the same, as recorded",
         ),
         (
-            *("--sphere", "RADIUS", "measurement.sphere"),
-            "of a sphere that indents the sample, as in '2.5 um': force or "
-            "indentation is read, the other is of --hold or --load",
+            *("--shape", "SHAPE", "measurement.shape"),
+            "what stands between force and modulus, as 'sphere 2.5 um' or 'pyramid 17.5 deg': "
+            "force or displacement is read, the other is of --hold or --load",
         ),
         ("--start", "SECONDS", _start, "the protocol's start on the clock, or fit to fit it [0]"),
         (
@@ -155,8 +174,12 @@ GROUPS: dict[str, list[tuple[str, str, Key, str]]] = {
     "the noise and the instrument": [
         ("--noise", "SD", "measurement.noise_rad", "known noise, in the readings' SI unit"),
         (
-            *("--noise-share", "SHARE", "measurement.noise_share"),
-            "known noise, as a share of the readings",
+            *("--noise-share", "SHARE", _share),
+            "known noise, as a share of the readings: 0.02 or 2%%",
+        ),
+        (
+            *("--phase-sd", "ANGLE", _phase_sd),
+            "known noise of a sweep's phase, as in 0.3deg; --noise-share is then the amplitude's",
         ),
         ("--sd", "COLUMN", "measurement.sd", "column of the readings' standard deviations"),
         (
@@ -174,6 +197,9 @@ GROUPS: dict[str, list[tuple[str, str, Key, str]]] = {
     ],
 }
 """Options by what they are about: name; what is given, nothing for a switch; key; help."""
+
+REPLACED = {"sphere": "shape"}
+"""Options that there were, and what there is instead."""
 
 OPTIONS = {
     name[2:].replace("-", "_"): key

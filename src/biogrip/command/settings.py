@@ -25,13 +25,22 @@ from typing import Any
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.command.options import OPTIONS, Setting
+from biogrip.command.options import OPTIONS, REPLACED, Setting
 from biogrip.command.outputs import COLUMNS
 from biogrip.digits import counted, plain
 from biogrip.errors import BiogripError, nearest
 from biogrip.identify.other_fits import Trace
-from biogrip.physics.instruments import GRIPPER, INSTRUMENTS, Instrument
+from biogrip.physics.instruments import (
+    DISPLACEMENT,
+    FORCE,
+    GRIPPER,
+    INSTRUMENTS,
+    STRAIN,
+    STRESS,
+    Instrument,
+)
 from biogrip.physics.models import ALIASES, CANDIDATES
+from biogrip.physics.shapes import SHAPES
 from biogrip.study.experiment_blocks import LONGEST_S, SHORTEST_S
 from biogrip.study.messages import checked, with_numbers
 from biogrip.study.source import (
@@ -51,6 +60,7 @@ from biogrip.traces.columns import (
     listed,
     number_and_unit,
     place,
+    shape_and_sizes,
     trace_file_problem,
 )
 from biogrip.traces.measurement_block import ARRAYS, READINGS, ByOptions, MeasurementBlock
@@ -68,15 +78,13 @@ LOAD = ("measurement", "load")
 """Key of the column of what was controlled."""
 
 _OF_NUMBERS = ("hold", "noise", "noise_share", "start", "from", "until")
-_OF_WORDS = ("noise_model", "offset", "drift", "reading", "sphere")
+_OF_WORDS = ("noise_model", "offset", "drift", "reading", "shape")
 # Other names of what is held.
 _HELD = ("held", "load", "pressure_Pa", "indentation_m")
 _PROTOCOLS = (HOLD, LOAD, ("protocol",))
 _PRONY = re.compile(r"prony_?([1-8])")
 # Share of the largest load so far below which a contact shrinks, not only scatters.
 _STAYS = 0.9
-# What a sphere's force and indentation count as.
-_BY_SPHERE = {"force": "stress", "displacement": "strain"}
 # Of each group of keys of the measurement, the one that is set last replaces the others.
 _ONE_OF = {"start_s", "fit_start"}, {*READINGS}
 _MOST_SHOWN = 10
@@ -126,27 +134,35 @@ class Asked:
     def given(self) -> dict[str, Any]:
         """Blocks of the user's: those of the config, and over them the settings.
 
-        A sphere's force and indentation are what they count as.
+        The load and the depth of a shape are what they count as.
         """
         blocks = read_configs(self.configs)
         for setting in self.settings:
             blocks = _laid_over(blocks, setting)
-        measured = _measured(blocks)
-        if measured.get("sphere") is None:
-            return blocks
-        for name in {*measured} & {*_BY_SPHERE.values()}:
+        counts_as = _by_shape(measured := _measured(blocks))
+        for name in {*measured} & ({*counts_as.values()} - {*counts_as}):
             raise BiogripError(
-                f"{self.place}: found a sphere and a reading of {name}; allowed are a force and an "
-                "indentation, as by --reading force=COLUMN."
+                f"{self.place}: found a shape and a reading of {name}; allowed are "
+                f"{' and '.join(counts_as)}, as by --reading {[*counts_as][name == STRAIN.name]}="
+                "COLUMN."
             )
-        renamed = {_BY_SPHERE.get(key, key): value for key, value in measured.items()}
-        return {**blocks, "measurement": renamed}
+        renamed = {counts_as.get(key, key): value for key, value in measured.items()}
+        return {**blocks, "measurement": renamed} if counts_as else blocks
 
     def read(self, columns: MeasurementBlock) -> Recording:
         """Read the trace; a `BiogripError` has file, line and column, or array and index."""
         if self.arrays:
             return recording_of_arrays(columns, *self.arrays)
         return read_recording(self.trace, columns)
+
+
+def _by_shape(measured: Mapping[str, Any]) -> dict[str, str]:
+    """Return as which stress and strain the load and the depth of a shape count; {} without one."""
+    if (text := measured.get("shape")) is None:
+        return {}
+    shape = SHAPES.get(str(text).strip().partition(" ")[0])
+    load = shape.load if shape else FORCE
+    return {load.name: STRESS.name, DISPLACEMENT.name: STRAIN.name}
 
 
 def _measured(blocks: Mapping[str, Any]) -> dict[str, Any]:
@@ -229,8 +245,8 @@ def _source(setting: Setting, known: set[KeyPath], merged: Mapping[str, Any], ca
     path: KeyPath = setting.path
     if path[0] == "sample":
         path = ("cases", case, *path)
-    if path[0] == "measurement" and "sphere" in merged["measurement"]:
-        path = (path[0], *(_BY_SPHERE.get(str(key), key) for key in path[1:]))
+    if path[0] == "measurement" and (counts_as := _by_shape(merged["measurement"])):
+        path = (path[0], *(counts_as.get(str(key), key) for key in path[1:]))
     held = {"protocol": merged["protocol"]}
     own = keys_in(held) if path in (HOLD, LOAD) else keys_in(setting.value, path)
     above = [path[:length] for length in range(1, len(path)) if path[:length] not in known]
@@ -531,6 +547,8 @@ def _column_problems(
         where = place(path, 1, name)
         if name and name in header[:number]:
             yield f"{where}: stands twice; allowed is each name once."
+        elif new := REPLACED.get(_plain(name)):
+            yield f"{where}: is now the column '{new}', with cells as in 'sphere 2.5 um'."
         elif name not in used and (name in COLUMNS or _OF_RESULTS.fullmatch(name)):
             yield f"{where}: is a column of the results; allowed is another name."
         elif name and cells and "." not in name and name not in used:
@@ -568,14 +586,16 @@ def load_in_words(trace: Trace, case: Case, given: Mapping[str, Any]) -> str:
 
 
 def _contact(case: Case) -> str:
-    """Return what turns a force and an indentation into a stress and a strain."""
-    sphere = case.block.measurement.sphere
-    return f", by Hertz's contact with a sphere of radius {sphere}" if sphere else ""
+    """Return what turns a load and a depth into a stress and a strain."""
+    if (text := case.block.measurement.shape) is None:
+        return ""
+    return f", by the shape {text} ({shape_and_sizes(text)[0].source})"
 
 
 def _shrinks(recording: Recording, case: Case) -> tuple[str, ...]:
-    """Return a sentence if a sphere was drawn back, where Hertz's contact has no such sum."""
-    if recording.load is None or case.block.measurement.sphere is None:
+    """Return a sentence if a tip was drawn back, where its contact has no such sum."""
+    instrument = case.block.measurement.instrument
+    if recording.load is None or instrument.read.power == instrument.controlled.power == 1:
         return ()
     time_s, loads = recording.load[recording.load[:, 0] <= recording.form["last_s"]].T
     most = np.maximum.accumulate(loads)
@@ -593,7 +613,7 @@ def _with_unit(number: str, unit: str) -> str:
 
 
 def remarks_on_hold(recording: Recording, case: Case, given: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return a sentence if a sphere was drawn back, or what was held may be in another unit.
+    """Return a sentence if a tip was drawn back, or what was held may be in another unit.
 
     That is if readings have a unit with a prefix, and what was held is a number.
     """

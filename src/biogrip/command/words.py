@@ -14,6 +14,7 @@ from biogrip.judging.without_model import BEYOND, EXPONENT, FLOW, LEVEL, LOSS
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.models import CANDIDATES
 from biogrip.terminal import aligned, visible, visible_lines
+from biogrip.traces.columns import shape_and_sizes
 from biogrip.traces.measurement_block import KNOWN_NOISE
 
 # Instrument whose readings span decades: their misfit is told over their noise.
@@ -316,10 +317,12 @@ def set_up_in_words(found: Mapping[str, Any]) -> list[str]:
     instrument, assumed = INSTRUMENTS[found["reads"]["quantity"]], found["assumed"]
     under = "" if instrument.sweeps else f" under {_protocol(found)}"
     said = [f"{instrument.in_words}{under}."]
-    if sphere := assumed["measurement"].get("sphere"):
+    if text := assumed["measurement"].get("shape"):
+        shape, poisson = shape_and_sizes(text)[0], assumed["measurement"].get("poisson", 0.5)
+        of_tip = f", with Poisson's ratio {poisson:g}" * shape.is_tip
         said.append(
-            f"By Hertz's contact with a sphere of radius R = {sphere}, a force F is the stress "
-            "9F/(16R²) and an indentation d the strain (d/R)^1.5; moduli are Young's."
+            f"Moduli are Young's by the shape, {text}: {shape.law} ({shape.source}), where "
+            f"{shape.condition}{of_tip}."
         )
     if "gripper" in assumed:
         own = assumed["gripper"]

@@ -9,7 +9,7 @@ by sines, one frequency after the other, and reads two moduli: rheometers, micro
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 
@@ -26,7 +26,7 @@ class Channel:
     label: str = ""
     """Name on axes, where it says more."""
     power: float = field(default=1.0, compare=False)
-    """Exponent of a number in such a unit, as 1.5 of the indentation by a sphere."""
+    """Exponent of a number in such a unit, as 1.5 of the depth of a sphere."""
 
     def in_si(self, sizes: Any, unit: str, scale: float = 1.0) -> Any:
         """Return numbers in one of the units, times a scale, in the SI unit."""
@@ -176,23 +176,6 @@ KINDS = tuple(dict.fromkeys(instrument.kind for instrument in INSTRUMENTS.values
 
 CONTROLLED = tuple(dict.fromkeys(instrument.controlled for instrument in INSTRUMENTS.values()))
 """Quantities that protocols set."""
-
-
-def under_sphere(instrument: Instrument, radius_m: float) -> Instrument:
-    """Return an instrument of stress and strain that has the force and indentation of a sphere.
-
-    On a half-space, incompressible and with Young's modulus E, a sphere of radius R that is
-    indented by d has the force F = 16/9 E sqrt(R) d^1.5 (Hertz). So 9 F/(16 R^2) is a stress under
-    the strain (d/R)^1.5, of a viscoelastic sample, too, while the contact does not shrink (Lee and
-    Radok, J. Appl. Mech. 27 (1960), 438-444). A `KeyError` has a quantity that is neither.
-    """
-    forces = {unit: 9 * size / (16 * radius_m**2) for unit, size in FORCE.units.items()}
-    depths = {unit: size / radius_m for unit, size in DISPLACEMENT.units.items()}
-    of = {
-        STRESS: replace(STRESS, units=forces, label="force"),
-        STRAIN: replace(STRAIN, units=depths, label="indentation", power=1.5),
-    }
-    return replace(instrument, controlled=of[instrument.controlled], read=of[instrument.read])
 
 
 def of_kind(kind: str) -> list[Instrument]:

@@ -29,6 +29,8 @@ class Measurements:
     """Noisy trace of each seed, (n_samples,) each."""
     sd: Array | None = None
     """Standard deviations of the readings, (n_samples,), where they are known."""
+    correlation: Array | None = None
+    """Correlation of the noise of both moduli of a sweep, (n_frequencies,)."""
     sd_known: bool = True
     """False if only their ratios are, see `Recording.sd_known`."""
     onset_s: float | None = None
@@ -46,6 +48,7 @@ class Measurements:
             readings,
             index,
             sd=self.sd,
+            correlation=self.correlation,
             sd_known=self.sd_known,
             onset_s=self.onset_s,
             remarks_before=self.remarks,
@@ -100,6 +103,7 @@ def write_measurements(path: Path, measurements: Measurements) -> None:
         "time_s": measurements.time_s,
         "target": measurements.target,
         "sd": measurements.sd,
+        "correlation": measurements.correlation,
         "sd_known": None if measurements.sd_known else False,
         "seeds": list(measurements.readings),
         "traces": list(measurements.readings.values()),

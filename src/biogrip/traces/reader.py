@@ -71,6 +71,8 @@ class Recording:
     """Units of the times and of the readings in the file."""
     sd: Array | None = None
     """Standard deviations of the readings, (n_samples,), where they are known."""
+    correlation: Array | None = None
+    """Correlation of the noise of both moduli of a sweep, (n_frequencies,), ascending."""
     sd_known: bool = True
     """False if only their ratios are, as of a sweep of which nothing says the noise."""
     onset_s: float | None = None
@@ -471,8 +473,9 @@ def _unit(
         unit_key, given = "load_unit", columns.load_unit
     elif key in ("sd", "loss_sd") and len(units) > 1:
         given = units[1]
-    said_by = columns.said_by(unit_key)
-    return unit_of(path, columns.named[key], given, allowed, said_by, below)
+    scale = columns.load_scale if key == "load" else columns.scale
+    said_by = columns.said_by(unit_key), below
+    return unit_of(path, columns.named[key], given, allowed, *said_by, scaled=scale is not None)
 
 
 def _numbers(
@@ -603,9 +606,15 @@ def _load(
         history, lines, _ = _averaged(history, lines)
     _check_order(path, columns, history[:, 0], lines)
     time_s = history[:, 0] * AXES[columns.axis][units[0]]
-    sizes = columns.instrument.controlled.in_si(history[:, 1], units[-1])
-    # Before its contact a sphere neither presses nor indents.
-    return np.column_stack((time_s, np.maximum(sizes, 0.0) if columns.sphere else sizes))
+    scale = columns.load_scale or 1.0
+    sizes = columns.instrument.controlled.in_si(history[:, 1], units[-1], scale)
+    if columns.has_tip and not np.any(sizes > 0):
+        raise BiogripError(
+            f"{place(path, lines[0], columns.load)}: found nothing above zero, allowed is a "
+            f"depth or a force of a tip in contact: turn it by {columns.said_by('load_scale')}."
+        )
+    # Before its contact a tip neither presses nor indents.
+    return np.column_stack((time_s, np.maximum(sizes, 0.0) if columns.has_tip else sizes))
 
 
 def _averaged(values: Array, lines: IntArray, first_sd: int = 2) -> tuple[Array, IntArray, int]:
