@@ -21,10 +21,10 @@ from biogrip.command.options import Setting
 from biogrip.command.outputs import WRITTEN_BY, Outcome, table_of
 from biogrip.command.settings import Asked, case_of
 from biogrip.command.words import for_a_paper, in_columns, noise_in_words
+from biogrip.config.source import HOLD
 from biogrip.errors import BiogripError
 from biogrip.judging.doubts import REJECTION
 from biogrip.physics.models import CANDIDATES
-from biogrip.study.source import HOLD
 from tests.generated_docs import example
 from tests.helpers.identified import FEW, by_quantity, identified, identify, told, write_drop
 from tests.helpers.places import EXAMPLE, EXAMPLE_TRUTH, ROOT

@@ -11,7 +11,8 @@ import pytest
 from biogrip.command import files as command
 from biogrip.command.options import Setting
 from biogrip.command.outputs import read_result, write_result
-from biogrip.command.settings import Asked, is_table, read_table
+from biogrip.command.settings import Asked
+from biogrip.command.sheet import is_table, read_table
 from biogrip.errors import BiogripError
 from biogrip.library import Sample, hold, set_up, simulate
 from tests.helpers.default import STUDY
@@ -305,7 +306,6 @@ def test_an_option_is_a_column_too_and_words_are_no_setting(tmp_path: Path) -> N
 
 def test_what_looks_like_a_setting_is_not_copied_beside_the_result(tmp_path: Path) -> None:
     for meant, names, cell in (
-        ("gripper.arm_length_m", ("arm_length_m", "Arm length", "gripper_arm_lenght_m"), "1"),
         ("hold", ("stress_Pa", "hold_Pa", "hodl", "pressure_mbar", "Force (pN)"), "1"),
         *(("hold", ["stress"], "8 Pa"), ("start", ["start_s"], "1")),
         *(("noise", ["noise (rad)", "noize"], "1"), ("noise_model", ["noise_modle"], "coloured")),

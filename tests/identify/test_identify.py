@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 import yaml
 
+from biogrip.config.source import overlaid
 from biogrip.identify.identify import identify
 from biogrip.library import INSTRUMENTS, BiogripError, Sample, hold, set_up
-from biogrip.stages.judgement import judge
-from biogrip.stages.targets import record
-from biogrip.study.source import overlaid
 from biogrip.traces.reader import recording_of_arrays
+from biogrip_study.stages.judgement import judge
+from biogrip_study.stages.targets import record
 from tests.helpers.columns import columns_of
 from tests.helpers.default import study_of
 from tests.helpers.identified import identified, write_trace

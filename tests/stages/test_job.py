@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from biogrip.errors import BiogripError
-from biogrip.records.rows import seeds_of
-from biogrip.stages import job
+from biogrip_study.records.rows import seeds_of
+from biogrip_study.stages import job
 from tests.helpers.default import STUDY, study_of
 
 NAME = "liquid_drop_2"
@@ -94,7 +94,7 @@ def test_every_seed_is_in_one_batch_and_full_ones_stay() -> None:
     [
         ("stages.targets", {"scipy", "pandas", "matplotlib", "biogrip.judging"}),
         ("stages.identification", {"scipy", "pandas", "matplotlib", "biogrip.judging"}),
-        ("stages.judgement", {"scipy.optimize", "pandas", "matplotlib", "biogrip.tables"}),
+        ("stages.judgement", {"scipy.optimize", "pandas", "matplotlib", "biogrip_study.tables"}),
         ("tables.cases", {"scipy", "matplotlib", "biogrip.judging.diagnosis"}),
         ("tables.study", {"scipy.stats", "matplotlib", "biogrip.judging.diagnosis"}),
         ("figures.course", {"scipy.stats", "biogrip.command"}),

@@ -18,21 +18,22 @@ from scipy.special import bdtr
 
 from biogrip.arrays import Array
 from biogrip.judging.verdicts import DETERMINED
-from biogrip.physics.calibration import ARM_KEYS, FreeMotion, calibrate, free_motion
+from biogrip.physics.gripper import ARM_KEYS
 from biogrip.physics.noise import Noise, add_noise, stream
 from biogrip.physics.protocol import sample_times
-from biogrip.records.identifications import (
+from biogrip_study.config.study import Case, Study
+from biogrip_study.gripper.calibration import FreeMotion, calibrate, free_motion
+from biogrip_study.records.identifications import (
     near_noise,
     read_histories,
     read_identifications,
     read_readings,
     share_with_limits,
 )
-from biogrip.records.rows import RowFile
-from biogrip.stages.job import job_study, logged, paths
-from biogrip.study.study import Case, Study
-from biogrip.tables.cases import value_in_case
-from biogrip.tables.layout import Column, Row, ShownTable, titled, write
+from biogrip_study.records.rows import RowFile
+from biogrip_study.stages.job import job_study, logged, paths
+from biogrip_study.tables.cases import value_in_case
+from biogrip_study.tables.layout import Column, Row, ShownTable, titled, write
 
 if TYPE_CHECKING:
     snakemake: Any

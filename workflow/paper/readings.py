@@ -12,19 +12,19 @@ import numpy as np
 import pandas as pd
 
 from biogrip.arrays import Array
+from biogrip.config.source import overlaid
 from biogrip.keys import built
-from biogrip.records.identifications import (
+from biogrip_study.config.case_blocks import CaseBlock
+from biogrip_study.config.study import Study
+from biogrip_study.records.identifications import (
     near_noise,
     near_noise_words,
     read_readings,
     share_with_limits,
 )
-from biogrip.stages.job import job_study, logged, paths
-from biogrip.study.case_blocks import CaseBlock
-from biogrip.study.source import overlaid
-from biogrip.study.study import Study
-from biogrip.tables.cases import interval_of, value_in_case
-from biogrip.tables.layout import Column, Row, ShownTable, titled, write
+from biogrip_study.stages.job import job_study, logged, paths
+from biogrip_study.tables.cases import interval_of, value_in_case
+from biogrip_study.tables.layout import Column, Row, ShownTable, titled, write
 
 if TYPE_CHECKING:
     snakemake: Any

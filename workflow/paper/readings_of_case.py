@@ -7,19 +7,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from biogrip.fit.genetic import identify_many
+from biogrip.config.source import overlaid
 from biogrip.keys import built
 from biogrip.physics.noise import add_noise, rms, stream
 from biogrip.physics.sample_model import SINGLE_BRANCH
-from biogrip.records.identifications import READINGS
-from biogrip.records.traces import read_target
-from biogrip.stages.identification import groups
-from biogrip.stages.job import arguments, logged
-from biogrip.stages.targets import response
-from biogrip.study.case_blocks import CaseBlock
-from biogrip.study.source import overlaid
-from biogrip.study.study import Case
 from biogrip.terminal import Progress
+from biogrip_study.config.case_blocks import CaseBlock
+from biogrip_study.config.study import Case
+from biogrip_study.methods.genetic import identify_many
+from biogrip_study.records.identifications import READINGS
+from biogrip_study.records.traces import read_target
+from biogrip_study.stages.identification import groups
+from biogrip_study.stages.job import arguments, logged
+from biogrip_study.stages.targets import response
 
 if TYPE_CHECKING:
     snakemake: Any
@@ -51,7 +51,7 @@ def _reading_rows(case: Case, target: Path) -> Iterator[tuple[str | int, ...]]:
             )
             traces = [add_noise(clean, read.noise, rng, at) for rng in noises]
             problems = experiment.of_each(at, traces)
-            answers = identify_many(problems, block.genetic_algorithm, searches)
+            answers = identify_many(problems, block.method("genetic"), searches)
             for seed, trace, answer in zip(seeds, traces, answers, strict=True):
                 names = experiment.searched.names
                 values = {**experiment.fixed, **dict(zip(names, answer.parameters, strict=True))}

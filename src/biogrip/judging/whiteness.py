@@ -431,11 +431,10 @@ def about_moduli(
     """
     storage = is_storage(residuals.trace.time_s)
     is_inertia, cause = find_inertia(residuals, residual, basis, growth)
+    chance = compare_halves(residual, basis, int(np.sum(~storage)), residuals.freedom)
     if is_inertia:
         yield f"The fit leaves what is of {cause}."
-        return
-    split, freedom = int(np.sum(~storage)), residuals.freedom
-    if (chance := compare_halves(residual, basis, split, freedom)) < levels.FALSE_ALARM:
+    elif chance < levels.FALSE_ALARM:
         yield (
             "The storage and the loss modulus, each fitted by itself, differ by more than white "
             f"noise ({p_value(chance)}): {cause}."
