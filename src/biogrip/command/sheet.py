@@ -28,8 +28,8 @@ from biogrip.traces.columns import listed, number_and_unit, place, trace_file_pr
 from biogrip.traces.measurement_block import READINGS
 
 _FILES = ("file", "filename", "filepath", "path", "trace", "tracefile")
-_OF_NUMBERS = ("hold", "noise", "noise_share", "start", "from", "until")
-_OF_WORDS = ("noise_model", "offset", "drift", "reading", "shape")
+_OF_NUMBERS: tuple[str, ...] = ("hold", "noise", "noise_share", "start", "from", "until")
+_OF_WORDS: tuple[str, ...] = ("noise_model", "offset", "drift", "reading", "shape")
 # Other names of what is held.
 _HELD = {"held", "load", "pressure", "indentation", *(channel.name for channel in CONTROLLED)}
 _SEPARATORS = ",;\t"
@@ -75,10 +75,10 @@ def _meant(name: str, cells: Sequence[str]) -> str | None:
     try:
         for cell in cells:
             number_and_unit(cell)
+        if {bare, _plain(name)} & _HELD:
+            return "hold"
     except ValueError:
         bare, options = _plain(name), _OF_WORDS
-    if options is _OF_NUMBERS and {bare, _plain(name)} & _HELD:
-        return "hold"
     return next(iter(get_close_matches(bare, options, n=1, cutoff=0.75)), None)
 
 

@@ -118,7 +118,7 @@ class _Smooth:
         """Deviance of second differences by Student's distribution."""
         total = -float(np.sum(np.log(np.abs(np.linalg.det(self.parts.T)))))
         for row in np.diff(self.apart, 2):
-            square = float(np.median(row**2)) + np.finfo(float).tiny
+            square = float(np.median(row**2) + np.finfo(float).tiny)
             for _ in range(_SCALINGS):
                 square = float(np.mean((_TAILS + 1) * row**2 / (_TAILS + row**2 / square)))
             tails = np.mean(np.log1p(row**2 / (_TAILS * square)))
