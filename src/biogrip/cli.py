@@ -89,14 +89,14 @@ def _models() -> list[str]:
     from biogrip.physics.models import ALIASES, MODELS
 
     width = max(map(len, MODELS))
-    lines = ["", "sample models (other names; prony3: generalized_maxwell_3 without c_p):"]
+    lines = ["", "sample models (other names; prony3, sls3: generalized_maxwell_3 without c_p):"]
     shown = {ALIASES.get(name, name): name for name in _USUAL}
     shown |= {name: name for name in MODELS if name not in shown}
     for name, usual in shown.items():
         others = [other for other in (*ALIASES, *MODELS) if ALIASES.get(other, other) == name]
         also = ", ".join(other for other in others if other != usual)
         lines.append(f"  {usual:<{width}}  {MODELS[name].title}" + (f" ({also})" if also else ""))
-    return lines
+    return [*lines, f"  {'jeffreys':<{width}}  Burgers fluid without its spring"]
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -126,8 +126,8 @@ GROUPS: dict[str, list[tuple[str, str, Key, str]]] = {
             *("--reading", "[QUANTITY=]COLUMN", _reading),
             "of readings, and their quantity [rotation=rotation_rad]; in creep displacement, "
             "strain, compliance; in relaxation force, stress, modulus, relative_modulus; of a "
-            "sweep storage, complex_modulus or storage_stiffness, and, by a second --reading, "
-            "loss, phase or loss_factor",
+            "sweep storage, complex_modulus, complex_viscosity or storage_stiffness, and, by a "
+            "second --reading, loss, phase or loss_factor",
         ),
         ("--time", "COLUMN", "measurement.time", "of times [time_s]"),
         ("--frequency", "COLUMN", "measurement.frequency", "of frequencies, of a sweep"),

@@ -23,7 +23,7 @@ from biogrip.arrays import Array
 from biogrip.command.hold import remarks_on_hold
 from biogrip.command.options import Setting
 from biogrip.config.case import SampleCase
-from biogrip.config.experiment_blocks import LONGEST_S, SHORTEST_S
+from biogrip.config.experiment_blocks import LARGEST_PARAMETER, LONGEST_S, SHORTEST_S
 from biogrip.config.loading import load, read_config_of, read_configs, trace_defaults
 from biogrip.config.messages import checked, with_numbers
 from biogrip.config.source import (
@@ -66,7 +66,7 @@ LOAD = ("measurement", "load")
 """Key of the column of what was controlled."""
 
 _PROTOCOLS = (HOLD, LOAD, ("protocol",))
-_PRONY = re.compile(r"prony_?([1-8])")
+_PRONY = re.compile(r"(?:prony|sls)_?([1-8])")
 # Of each group of keys of the measurement, the one that is set last replaces the others.
 _ONE_OF = {"start_s", "fit_start"}, {*READINGS}
 _MOST_SHOWN = 10
@@ -159,6 +159,9 @@ def _laid_over(blocks: dict[str, Any], setting: Setting) -> dict[str, Any]:
     if prony := _PRONY.fullmatch(name):
         name = f"generalized_maxwell_{prony[1]}".removesuffix("_1")
         blocks = overlaid(blocks, {"fixed": {"c_p": 0.0}})
+    if name == "jeffreys":
+        # A Burgers fluid whose spring is rigid.
+        name, blocks = "burgers", overlaid(blocks, {"fixed": {"k_s": LARGEST_PARAMETER}})
     if sample := CANDIDATES.get(ALIASES.get(name, name)):
         path, value = ("sample",), {"model": sample.name, "branches": sample.branches}
     for part in reversed(path):

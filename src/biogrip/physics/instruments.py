@@ -9,7 +9,7 @@ by sines, one frequency after the other, and reads two moduli: rheometers, micro
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 
@@ -53,8 +53,8 @@ class Channel:
 
     @property
     def column(self) -> str:
-        """Usual name of a column or key: the name with the unit."""
-        return self.name + self.suffix
+        """Usual name of a column or key: the name with the unit of its numbers."""
+        return self.name + replace(self, unit=self.unit and next(iter(self.units))).suffix
 
 
 def _raised(sizes: Any, power: float) -> Any:
@@ -147,6 +147,8 @@ LOSS_FACTOR = Channel("loss_factor", "", {"1": 1.0, "%": 1e-2})
 _LOSSES = Channel("loss", "Pa", STRESS_UNITS), PHASE, LOSS_FACTOR
 _STIFF_LOSSES = Channel("loss", "N/m", _STIFFNESSES), PHASE, LOSS_FACTOR
 _MODULI = [Channel(name, "Pa", STRESS_UNITS) for name in ("storage", "complex_modulus")]
+VISCOSITY = Channel("complex_viscosity", "Pa", {"Pa s": 1.0, "mPa s": 1e-3, "P": 0.1, "cP": 1e-3})
+"""It is times the angular frequency a modulus, which is what a trace has of it."""
 _STIFF = Channel("storage_stiffness", "N/m", _STIFFNESSES)
 
 _READ_BOTH = "In oscillation storage and loss moduli were recorded over frequency"
@@ -162,7 +164,10 @@ INSTRUMENTS: dict[str, Instrument] = {
         Instrument("relaxation", STRAIN, STRESS, stiffness="Pa"),
         Instrument("relaxation", STRAIN, MODULUS, stiffness="Pa", relative=True),
         Instrument("relaxation", STRAIN, RELATIVE_MODULUS, stiffness="", relative=True),
-        *(Instrument("oscillation", STRAIN, of, "Pa", True, _LOSSES, _READ_BOTH) for of in _MODULI),
+        *(
+            Instrument("oscillation", STRAIN, of, "Pa", True, _LOSSES, _READ_BOTH)
+            for of in (*_MODULI, VISCOSITY)
+        ),
         Instrument("oscillation", DISPLACEMENT, _STIFF, "N/m", True, _STIFF_LOSSES, _READ_BOTH),
     )
 }

@@ -9,6 +9,7 @@ from collections.abc import Collection, Mapping
 from contextlib import suppress
 from math import pi
 from pathlib import Path
+from shlex import quote
 from unicodedata import normalize
 
 from biogrip.errors import BiogripError, nearest
@@ -17,6 +18,7 @@ from biogrip.physics.instruments import (
     INSTRUMENTS,
     MODULUS,
     PHASE,
+    ROTATION,
     STRAIN,
     Channel,
 )
@@ -125,7 +127,11 @@ def unit_of(
             row, how = f"{row}, neither stated (by {said_by}) nor at the end of the name", ""
         of_moduli = not end and allowed == MODULUS.units
         hint = " What is over another modulus, as G/G0, is a relative_modulus." * of_moduli
-        if allowed == STRAIN.units and known_unit(end or _bare(below), DISPLACEMENT.units):
+        if allowed == ROTATION.units:
+            names = (name for name in INSTRUMENTS if name in plain_name(column).lower())
+            example = f"{next(names, STRAIN.name)}={column}"
+            hint = f" Which quantity is it? Say so, as by --reading {quote(example)}."
+        elif allowed == STRAIN.units and known_unit(end or _bare(below), DISPLACEMENT.units):
             hint = " A length is a strain by the sample's shape, see --shape, or by a scale."
         raise BiogripError(f"{where}: found {found}{row}; allowed are {choices}{how}.{hint}")
     for other, said in ((at_end, "the name"), (in_row, "the row of units")):

@@ -112,6 +112,9 @@ class MeasurementBlock(Block):
     """Name of the column of storage moduli of a frequency sweep (`instrument: oscillation`)."""
     complex_modulus: _Name = None
     """Name of the column of absolute values of the complex modulus (oscillation)."""
+    complex_viscosity: _Name = None
+    """Name of the column of complex viscosities, moduli over the angular frequency
+    (oscillation)."""
     storage_stiffness: _Name = None
     """Name of the column of storage stiffnesses, in N/m (oscillation)."""
     frequency: _Name = None
@@ -323,7 +326,8 @@ class MeasurementBlock(Block):
             found = " and ".join(sorted(partners)) or "none"
             text = f"goes with one of {', '.join(PARTNERS)}; found {found}"
             yield (self.readings[0],), f"{text}. Say which, as in --reading loss=COLUMN."
-        if len(given & {"sd", "loss_sd"}) == 1 or ("sd" in given and "loss" not in given):
+        alone = len(given & {"sd", "loss_sd"}) == 1 or ("sd" in given and "loss" not in given)
+        if alone or {"sd", "complex_viscosity"} <= given:
             yield ("sd",), "of a sweep goes with loss and loss_sd: both moduli need deviations."
         for key in sorted(given & {"start_s", "load", "fit_start", "offset", "drift"}):
             yield (key,), "is of a trace in time, and this is a frequency sweep; leave it out."

@@ -1,6 +1,6 @@
 """Reader of recorded traces in the user's own files, with gaps, units and line numbers."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import isfinite
 from pathlib import Path
@@ -12,7 +12,7 @@ import numpy as np
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.digits import counted, plain
 from biogrip.errors import BiogripError, nearest
-from biogrip.physics.instruments import INSTRUMENTS, PHASE, ROTATION
+from biogrip.physics.instruments import INSTRUMENTS, PHASE, ROTATION, VISCOSITY
 from biogrip.physics.protocol import joined
 from biogrip.terminal import visible
 from biogrip.traces.columns import AXES, listed, place, shortened, unit_of
@@ -384,8 +384,12 @@ def _checked(
     )
 
 
-def _no_column(path: Path, line: int | None, column: str, names: list[str]) -> str:
-    there = f"The file has: {listed(names)}.{nearest(column, names)}"
+def _no_column(
+    path: Path, line: int | None, column: str, names: list[str], read: Collection[str] = ()
+) -> str:
+    """Return that there is no such column, and which is nearest of those that are not read."""
+    near = nearest(column, [name for name in names if name not in read])
+    there = f"The file has: {listed(names)}.{near}"
     return f"{place(path, line)}: there is no column '{visible(column)}'. {there}"
 
 
@@ -405,8 +409,10 @@ def _both_moduli(
         found = f"found a frequency of {values[row, 0]:.3g}; allowed is one above 0"
         raise BiogripError(f"{place(path, lines[row])}: {found}.")
     first = values[:, 1] * (read.units[units[1]] * scale)
+    if read is VISCOSITY:
+        first = first * values[:, 0] * AXES[columns.axis][units[0]]
     second = values[:, 2] * partner.units[units[2]]
-    is_whole = read.name == "complex_modulus"
+    is_whole = read is VISCOSITY or read.name == "complex_modulus"
     if partner.unit == read.unit:
         loss = second * scale
         square = first**2 - loss**2
@@ -437,7 +443,7 @@ def _columns_of(
     for key, column in columns.named.items():
         same, where = table.indices(column), place(path, line, column)
         if not same:
-            said = _no_column(path, line, column, table.names)
+            said = _no_column(path, line, column, table.names, columns.named.values())
             problems.append(f"{said} Say which is which by {ways}{example}.")
             continue
         if len(same) > 1:

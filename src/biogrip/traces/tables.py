@@ -362,15 +362,17 @@ def _header(sheet: Sheet, at: int, columns: MeasurementBlock) -> Table | None:
     table = Table(at, sheet.cells[at, : sheet.widths[at]].tolist(), at + 1, is_step=is_step)
     if table.common(columns) == len(columns.named):
         return _with_header_rows(sheet, table, columns)
-    if _count_numbers(table.names) or sum(map(bool, table.names)) < 2:
+    filled = [name for name in table.names if name]
+    if _count_numbers(filled) or len(filled) < 2 or all(map(in_brackets, filled)):
         return None
-    below = [row for row in range(at + 1, min(at + 4, len(sheet.cells))) if any(sheet.cells[row])]
+    most = min(at + 1 + _MOST_HEADER_ROWS, len(sheet.cells))
+    below = [row for row in range(at + 1, most) if any(sheet.cells[row])]
     if len(below) < 2 or any(sheet.cells[below[0], len(table.names) :]):
         return None
     units = sheet.cells[below[0], : len(table.names)].tolist()
-    numbers = _count_numbers(sheet.cells[below[1]])
-    of_step = is_step and numbers > _count_numbers(units)
-    if of_step or (numbers and all(in_brackets(unit) for unit in units if unit)):
+    numbers = [_count_numbers(sheet.cells[row]) for row in below[1:]]
+    of_step = is_step and numbers[0] > _count_numbers(units)
+    if of_step or (any(numbers) and all(map(in_brackets, filter(None, units)))):
         return replace(table, units=units, units_at=below[0], first=below[0] + 1)
     return None
 
