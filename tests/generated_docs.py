@@ -290,10 +290,12 @@ def _quantities(*options: str) -> str:
 
 def folders() -> str:
     told = {
-        file.parent.name: str(ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))))
-        for file in sorted((ROOT / "src" / "biogrip").glob("*/__init__.py"))
+        file.parent.relative_to(ROOT / "src"): str(
+            ast.get_docstring(ast.parse(file.read_text("utf-8")))
+        )
+        for file in sorted((ROOT / "src").glob("*/*/__init__.py"))
     }
-    return _table({"folder of `src/biogrip/`": name, "has": has} for name, has in told.items())
+    return _table({"folder of `src/`": str(name), "has": has} for name, has in told.items())
 
 
 def command_help() -> str:

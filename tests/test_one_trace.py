@@ -197,7 +197,7 @@ REFUSED = {
     "identify a.csv b.csv --output x.json": "--output: only for one trace",
     "identify table.csv --output x.json": "--output: only for one trace",
     "identify table.csv --csv a.csv": "a.csv: is read; allowed is another file to write.",
-    "identify a.csv b.csv --config bad.yaml": "bad.yaml, line 1: seedz: unknown key",
+    "identify a.csv b.csv --config bad.yaml": "bad.yaml, line 1: protocl: unknown key",
 }
 
 
@@ -210,7 +210,7 @@ def test_what_cannot_be_used_is_named_once_and_at_once(
         shutil.copy(EXAMPLE, name)
     Path("table.csv").write_text("file,dish\na.csv,left\n")
     Path("theirs.html").write_text("<p>mine</p>")
-    Path("bad.yaml").write_text("seedz: 3")
+    Path("bad.yaml").write_text("protocl: 3")
     Path("link.csv").symlink_to("a.csv")
     Path("link.json").symlink_to("b.csv")
     os.mkfifo("pipe")

@@ -209,7 +209,7 @@ def _add_design(commands: Any) -> None:
     text = "search a protocol of steps that determines the samples of a config better"
     design = commands.add_parser("design", help=text, description=text)
     design.set_defaults(command="biogrip.design:design")
-    design.examples = ("design my.yaml",)
+    design.examples = ("design my.yaml", "design my.yaml --output designed.yaml")
     design.cost = "The search takes less than a minute."
     text = "YAML file with your samples"
     design.add_argument("config", type=Path, help=text)

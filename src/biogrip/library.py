@@ -280,7 +280,7 @@ def set_up(
     sample
         Constitutive model of the sample.
     ranges
-        Search ranges by name; by default those of the default study.
+        Search ranges by name; by default those of every trace.
     fixed
         Fixed parameters by name, SI units.
     """

@@ -103,6 +103,6 @@ def test_every_seed_is_in_one_batch_and_full_ones_stay() -> None:
 )
 def test_a_job_loads_nothing_large_that_it_does_not_use(module: str, unused: set[str]) -> None:
     """Loading pandas, `scipy.special` or `scipy.stats` takes longer than many a job."""
-    code = f"import sys, biogrip.{module}; print(*sys.modules)"
+    code = f"import sys, biogrip_study.{module}; print(*sys.modules)"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert not unused & set(run.stdout.split())

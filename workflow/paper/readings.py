@@ -16,6 +16,7 @@ from biogrip.config.source import overlaid
 from biogrip.keys import built
 from biogrip_study.config.case_blocks import CaseBlock
 from biogrip_study.config.study import Study
+from biogrip_study.methods.genome import encodable_values
 from biogrip_study.records.identifications import (
     near_noise,
     near_noise_words,
@@ -69,7 +70,7 @@ def printable(study: Study, reading: str) -> dict[str, int]:
         changes = study.config.readings[reading].changes
         ranges = built(CaseBlock, overlaid(case.plain, changes)).search_range
         for name, printed in case.published.identified.items():
-            held = getattr(ranges, name).values
+            held = encodable_values(getattr(ranges, name))
             ends = {"exactly": (printed, printed), "rounded": interval_of(printed, None, None)}
             ends["with_error"] = (value_in_case(case, [name]) or ends["rounded"])[-2:]
             counts["values"] += 1

@@ -1,6 +1,6 @@
-"""What is asked of recorded traces, and the study of one case that each of them is.
+"""What is asked of recorded traces, and the case that each of them is.
 
-A setting is a key of the config with a value. Over the default study lies the user's config, over
+A setting is a key of the config with a value. Over the defaults lies the user's config, over
 that the options of the command, and over these the cells of a table of traces. All are checked as
 a config is; messages name the file and line, the option, or the row of the table.
 
@@ -79,7 +79,7 @@ class Asked:
     trace: Path
     """CSV file."""
     config: Path | None = None
-    """YAML file laid over the default study: gripper, protocol, search range, ..."""
+    """YAML file laid over the defaults: gripper, protocol, search range, ..."""
     settings: tuple[Setting, ...] = ()
     """Settings laid over the config, the later over the earlier."""
     place: str = TRACE

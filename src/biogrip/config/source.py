@@ -148,7 +148,7 @@ def _read(file: Path) -> tuple[Lines, dict[str, Any]]:
         raise _wrong(file, mark and mark.line + 1, f"not valid YAML: {said}.") from error
 
 
-# The default study is read again for every trace.
+# The defaults are read again for every trace.
 @lru_cache(maxsize=16)
 def _parsed(file: Path, text: str) -> tuple[Lines, dict[str, Any]]:
     root = yaml.compose(text, Loader=_Loader)

@@ -66,13 +66,14 @@ def _of_methods() -> type[Block]:
 
 
 if TYPE_CHECKING:
-    _MethodBlocks = Block
+
+    class _MethodBlocks(Block): ...
 else:
     _MethodBlocks = _of_methods()
 
 
 @dataclass(frozen=True, kw_only=True)
-class Shared(ExperimentBlocks, _MethodBlocks):
+class Shared(_MethodBlocks, ExperimentBlocks):
     """Blocks that a study sets for all cases, and that a case may change for itself."""
 
     models: Equations

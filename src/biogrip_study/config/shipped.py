@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from biogrip import files
+from biogrip.files import software as versions_and_digest
 
 # The wheel contains a copy of these files of the repository.
 _PACKAGE = Path(__file__).parents[1]
@@ -28,4 +28,4 @@ def snakefile() -> Path:
 
 def software() -> Mapping[str, str]:
     """Return versions of what computes the study, and a digest of its source."""
-    return files.software(_PACKAGE)
+    return versions_and_digest(_PACKAGE)

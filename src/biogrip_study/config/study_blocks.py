@@ -246,7 +246,7 @@ class TracesBlock(Block):
     """The table, a row a trace; relative to where Snakemake runs."""
     config: Annotated[str | None, Field(min_length=1, max_length=4000)] = None
     """Config of the traces, as `biogrip identify --config` takes it: gripper, protocol, ... By
-    default the default study's."""
+    default that of every trace."""
     model: CandidateName = "generalized_maxwell"
     """Sample model of all traces; a column `sample.model` goes before it."""
     rows_a_batch: Annotated[int, Field(ge=1, le=100_000)] = 100
