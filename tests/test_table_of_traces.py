@@ -163,7 +163,7 @@ def test_settings_that_cannot_be_used_are_said_at_once(here: Path) -> None:
     said = [
         "line 2, column 'measurement.noise_rad': measurement.noise_rad: found -1, allowed is",
         "line 2, column 'measurment.skip': measurment: unknown key. Did you mean 'measurement'",
-        "line 2, column 'sample.model': sample.model: found 'maxwel'. Did you mean 'maxwell'?",
+        "line 2, column 'sample.model': sample.model: found 'maxwel'. Did you mean 'maxwell' or",
         "line 3, column 'fixed.k_s': fixed.k_s: is no parameter of the sample, which has k_p",
     ]
     lines = [line.partition("cells.tsv, ")[2] for line in error.splitlines()]

@@ -18,4 +18,4 @@ def nearest(name: object, allowed: Iterable[str]) -> str:
 def nearest_three(name: object, allowed: Iterable[str]) -> str:
     """Return the three allowed names closest to `name`, for a message."""
     close = get_close_matches(str(name).lower(), [*dict.fromkeys(allowed)], n=3, cutoff=0.0)
-    return ", ".join(f"'{choice}'" for choice in close)
+    return " or ".join(f"'{choice}'" for choice in close)

@@ -98,7 +98,7 @@ def _text(
             choices = leaf.get("enum")
             if usual := leaf.get("usual"):
                 near = nearest_three(found, [*choices, *usual])
-                return f"found {_shown(found)}, nearest are {near}; biogrip identify -h lists all."
+                return f"found {_shown(found)}. Did you mean {near}? All: biogrip identify -h."
             hint = "" if choices in _UNITS_OF_FILES else nearest(found, choices)
             return f"found {_shown(found)}.{hint} Allowed: {', '.join(choices)}."
         case "string_pattern_mismatch" if of_name:

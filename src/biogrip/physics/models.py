@@ -263,7 +263,7 @@ class Sample:
             object.__setattr__(self, "branches", int(branches[1]))
         if name not in MODELS:
             near = nearest_three(name, [*MODELS, *ALIASES])
-            raise BiogripError(f"found the sample model '{name}', nearest are {near}.")
+            raise BiogripError(f"found the sample model '{name}'. Did you mean {near}?")
         object.__setattr__(self, "name", name)
 
     @property
