@@ -118,9 +118,10 @@ class _Smooth:
         """Deviance of second differences by Student's distribution."""
         total = -float(np.sum(np.log(np.abs(np.linalg.det(self.parts.T)))))
         for row in np.diff(self.apart, 2):
-            square = float(np.median(row**2) + np.finfo(float).tiny)
+            square, least = float(np.median(row**2)), np.finfo(float).tiny
             for _ in range(_SCALINGS):
-                square = float(np.mean((_TAILS + 1) * row**2 / (_TAILS + row**2 / square)))
+                weights = (_TAILS + 1) / (_TAILS + row**2 / max(square, least))
+                square = max(float(np.mean(weights * row**2)), least)
             tails = np.mean(np.log1p(row**2 / (_TAILS * square)))
             total += self.apart.shape[1] * float(0.5 * np.log(square) + 0.5 * (_TAILS + 1) * tails)
         return total

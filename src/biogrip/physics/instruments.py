@@ -9,7 +9,7 @@ by sines, one frequency after the other, and reads two moduli: rheometers, micro
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 
@@ -25,6 +25,8 @@ class Channel:
     """Units of a file's column, as multiples of the SI unit."""
     label: str = ""
     """Name on axes, where it says more."""
+    usual: str = ""
+    """Usual name of a column whose numbers have another unit."""
     power: float = field(default=1.0, compare=False)
     """Exponent of a number in such a unit, as 1.5 of the depth of a sphere."""
 
@@ -53,8 +55,8 @@ class Channel:
 
     @property
     def column(self) -> str:
-        """Usual name of a column or key: the name with the unit of its numbers."""
-        return self.name + replace(self, unit=self.unit and next(iter(self.units))).suffix
+        """Usual name of a column or key: the name with the unit."""
+        return self.usual or self.name + self.suffix
 
 
 def _raised(sizes: Any, power: float) -> Any:
@@ -147,7 +149,10 @@ LOSS_FACTOR = Channel("loss_factor", "", {"1": 1.0, "%": 1e-2})
 _LOSSES = Channel("loss", "Pa", STRESS_UNITS), PHASE, LOSS_FACTOR
 _STIFF_LOSSES = Channel("loss", "N/m", _STIFFNESSES), PHASE, LOSS_FACTOR
 _MODULI = [Channel(name, "Pa", STRESS_UNITS) for name in ("storage", "complex_modulus")]
-VISCOSITY = Channel("complex_viscosity", "Pa", {"Pa s": 1.0, "mPa s": 1e-3, "P": 0.1, "cP": 1e-3})
+VISCOSITY = Channel(
+    *("complex_viscosity", "Pa", {"Pa s": 1.0, "mPa s": 1e-3, "P": 0.1, "cP": 1e-3}),
+    usual="complex_viscosity_Pas",
+)
 """It is times the angular frequency a modulus, which is what a trace has of it."""
 _STIFF = Channel("storage_stiffness", "N/m", _STIFFNESSES)
 
