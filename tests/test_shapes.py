@@ -9,7 +9,7 @@ import pytest
 from biogrip.arrays import Array
 from biogrip.command.words import set_up_in_words
 from biogrip.physics.instruments import INSTRUMENTS
-from biogrip.physics.shapes import SHAPES, under_shape
+from biogrip.physics.shapes import KNOWN_SHAPES, under_shape
 from biogrip.traces.columns import shape_and_sizes
 from biogrip.traces.reader import recording_of_arrays
 from tests.helpers.columns import columns_of
@@ -80,7 +80,7 @@ def test_a_force_that_is_held_tells_compliances(tmp_path: Path) -> None:
 
 
 def test_a_number_counts_by_its_power_and_back() -> None:
-    sphere = SHAPES["sphere"]
+    sphere = KNOWN_SHAPES["sphere"]
     depth = under_shape(INSTRUMENTS["strain"], sphere, [2e-6], 0.5).read
     assert depth.in_si(np.array([8.0, -8.0, 0.0]), "um").tolist() == [8.0, -8.0, 0.0]
     assert depth.in_unit(np.array([8.0, 0.0]), "um") == pytest.approx([8.0, 0.0])

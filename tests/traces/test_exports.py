@@ -82,7 +82,7 @@ def test_blocks_that_are_one_test_are_joined(tmp_path: Path, begins: str) -> Non
     np.testing.assert_allclose(found.readings, expected)
     np.testing.assert_array_equal(found.load[:, 1], np.repeat([5.0, 0.0], (6, 8)))
     assert found.lines.tolist() == [*range(4, 10), *range(13, 21)]
-    assert found.form["block"] == [1, 2]
+    assert found.form["block"] == (1, 2)
     again = [it for it in found.remarks() if "Times of block 2 begin anew" in it]
     assert len(again) == (begins != "goes on")
     message = said(tmp_path / "t.csv", text, **keys)

@@ -36,14 +36,14 @@ def _reading(text: str) -> tuple[Path, Any]:
     return ("measurement", text if text in INSTRUMENTS else "rotation"), text
 
 
-def _block(text: str) -> tuple[Path, Any]:
+def _blocks_read(text: str) -> tuple[Path, Any]:
     with suppress(ValueError):
         numbers = [int(number) for number in text.split(",")]
         return ("measurement", "block"), numbers if numbers[1:] else numbers[0]
     raise ValueError(f"found '{text}', allowed is a number, or several as in 1,2")
 
 
-def _rows(text: str) -> tuple[Path, Any]:
+def _rows_used(text: str) -> tuple[Path, Any]:
     column, _, value = text.rpartition("=")
     if not (column and value):
         raise ValueError(f"found '{text}', allowed is COLUMN=VALUE, as in 'T (C)=20'")
@@ -132,11 +132,11 @@ GROUPS: dict[str, list[tuple[str, str, Key, str]]] = {
         ("--time", "COLUMN", "measurement.time", "of times [time_s]"),
         ("--frequency", "COLUMN", "measurement.frequency", "of frequencies, of a sweep"),
         (
-            *("--block", "N,...", _block),
+            *("--block", "N,...", _blocks_read),
             "number of the table to read, of several in the file; 1,2 joins two that are one test",
         ),
         (
-            *("--rows", "COLUMN=VALUE", _rows),
+            *("--rows", "COLUMN=VALUE", _rows_used),
             "use only rows with this in another column, as in 'T (C)=20'; repeatable",
         ),
     ],

@@ -47,7 +47,7 @@ from biogrip.physics.instruments import (
     Instrument,
 )
 from biogrip.physics.models import ALIASES, CANDIDATES
-from biogrip.physics.shapes import SHAPES
+from biogrip.physics.shapes import KNOWN_SHAPES
 from biogrip.traces.columns import (
     held_unit,
     place,
@@ -137,7 +137,7 @@ def _by_shape(measured: Mapping[str, Any]) -> dict[str, str]:
     """Return as which stress and strain the load and the depth of a shape count; {} without one."""
     if (text := measured.get("shape")) is None:
         return {}
-    shape = SHAPES.get(str(text).strip().partition(" ")[0])
+    shape = KNOWN_SHAPES.get(str(text).strip().partition(" ")[0])
     load = shape.load if shape else FORCE
     return {load.name: STRESS.name, DISPLACEMENT.name: STRAIN.name}
 

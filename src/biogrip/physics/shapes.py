@@ -55,7 +55,7 @@ class Shape:
         return PHASE if self.example.endswith("deg") else DISPLACEMENT
 
 
-SHAPES = {
+KNOWN_SHAPES = {
     shape.example.partition(" ")[0]: shape
     for shape in (
         Shape(

@@ -22,7 +22,7 @@ from biogrip.physics.instruments import (
     STRAIN,
     Channel,
 )
-from biogrip.physics.shapes import SHAPES, Shape
+from biogrip.physics.shapes import KNOWN_SHAPES, Shape
 from biogrip.terminal import visible
 
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0, "d": 86_400.0}
@@ -78,8 +78,20 @@ _PURE = re.compile(
 _RATIO = re.compile(r"[^\W\d_]+\d*\s*/\s*([^\W_]+)")
 # 1/s in a column of this name is rad/s; in another it may as well be Hz.
 _ANGULAR = re.compile("ang|omega|ω|kreis", re.I)
-_OF_READINGS = {unit for instrument in INSTRUMENTS.values() for unit in instrument.read.units}
-_UNITS = {*TIME_UNITS, "V", "mV", "uV", "A", "mA", "px", "pixel", "pixels", "counts", *_OF_READINGS}
+_READING_UNITS = {unit for instrument in INSTRUMENTS.values() for unit in instrument.read.units}
+_UNITS = {
+    *TIME_UNITS,
+    "V",
+    "mV",
+    "uV",
+    "A",
+    "mA",
+    "px",
+    "pixel",
+    "pixels",
+    "counts",
+    *_READING_UNITS,
+}
 _NUMBERED = re.compile(r"[ _]?(\d+|\(\d*\)|\[\d*\])$")
 # A number with what may be its unit behind it.
 _SIZED = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s*(.*?)\s*", re.I)
@@ -112,7 +124,7 @@ def unit_of(
     unit = (at_end or in_row) if given is None else known_unit(given, allowed)
     if given is not None and unit is None:
         raise BiogripError(f"{where}: found the unit '{given}', allowed are {choices}.")
-    in_row = in_row or (known_unit(_bare(below), _OF_READINGS) if given and not scaled else None)
+    in_row = in_row or (known_unit(_bare(below), _READING_UNITS) if given and not scaled else None)
     of_frequency = unit == "1/s" and "Hz" in allowed
     if of_frequency and not _ANGULAR.search(plain_name(column)):
         raise BiogripError(f"{where}: found the unit 1/s; allowed are rad/s or Hz, by {said_by}.")
@@ -189,8 +201,8 @@ def shape_and_sizes(text: str) -> tuple[Shape, list[float]]:
     A `ValueError` says what is allowed.
     """
     name, _, rest = plain_name(text).partition(" ")
-    if (shape := SHAPES.get(name)) is None:
-        examples = ", ".join(f"'{known.example}'" for known in SHAPES.values())
+    if (shape := KNOWN_SHAPES.get(name)) is None:
+        examples = ", ".join(f"'{known.example}'" for known in KNOWN_SHAPES.values())
         raise ValueError(f"found '{shortened(text)}', allowed are, as examples, {examples}")
     sizes, units = list[float](), shape.sizes.units
     with suppress(ValueError, KeyError):

@@ -12,18 +12,13 @@ from itertools import combinations
 import numpy as np
 from scipy.special import fdtrc
 
+from biogrip import levels
 from biogrip.arrays import Array
 from biogrip.digits import plain
 from biogrip.traces.tables import number_or_inf
 
 FEWEST_ROWS = 3
 """Fewest rows of a condition."""
-
-_LEVEL = 1e-3
-"""Level of the test: of a thousand files with repeated readings one is taken for several."""
-
-ALIKE = 0.01
-"""Share by which numbers of one condition scatter, as 19.9 and 20.1 for 20."""
 
 
 def are_repeats(places: Array, readings: Array) -> bool:
@@ -44,7 +39,7 @@ def are_repeats(places: Array, readings: Array) -> bool:
     of_noise = 1 / counts[1:-1] + (1 - later) ** 2 / counts[:-2] + later**2 / counts[2:]
     about_lines = np.mean(bent**2 / of_noise, axis=1)
     chances = fdtrc(more, free, within / np.maximum(about_lines, np.finfo(float).tiny))
-    return bool(np.all(chances > _LEVEL / len(chances)))
+    return bool(np.all(chances > levels.CONDITIONS / len(chances)))
 
 
 def tells_apart(places: Array, others: Mapping[str, Sequence[str]]) -> dict[str, list[str]]:
@@ -72,21 +67,23 @@ def is_like(cell: str, wanted: float | str) -> bool:
     """
     if isinstance(wanted, str):
         return cell == wanted
-    number = _number(cell)
-    near = abs(number - wanted) <= ALIKE * abs(wanted)
+    number = _number_in(cell)
+    near = abs(number - wanted) <= levels.MEASURED_ALIKE * abs(wanted)
     return cell == str(wanted) or number == wanted or (near and not number.is_integer())
 
 
 def _measured(cells: Sequence[str]) -> list[str]:
     """Return cells; of numbers so close that they scatter about one, their mean."""
-    numbers = np.array([*map(_number, cells)])
+    numbers = np.array([*map(_number_in, cells)])
     if not np.all(np.isfinite(numbers)) or np.all(numbers == np.rint(numbers)):
         return [*cells]
     values, place = np.unique(numbers, return_inverse=True)
-    group = np.append(0, np.cumsum(np.diff(values) > ALIKE * np.abs(values[1:])))[place]
+    group = np.append(0, np.cumsum(np.diff(values) > levels.MEASURED_ALIKE * np.abs(values[1:])))[
+        place
+    ]
     means = np.bincount(group, numbers) / np.bincount(group)
     return [plain(mean) for mean in means[group]]
 
 
-def _number(cell: str) -> float:
+def _number_in(cell: str) -> float:
     return float(number_or_inf(cell.replace(",", ".")))

@@ -70,10 +70,12 @@ def _unit(allowed: Mapping[str, float]) -> BeforeValidator:
 
 _Name = Annotated[str | None, Field(min_length=1, max_length=4000)]
 
-_Block = Annotated[int, Field(ge=1, le=1_000_000)]
+_BlockNumber = Annotated[int, Field(ge=1, le=1_000_000)]
 _Blocks = Annotated[
-    Annotated[_Block, Tag("a number")]
-    | Annotated[Distinct[tuple[_Block, ...]], Field(min_length=1, max_length=1000), Tag("a list")],
+    Annotated[_BlockNumber, Tag("a number")]
+    | Annotated[
+        Distinct[tuple[_BlockNumber, ...]], Field(min_length=1, max_length=1000), Tag("a list")
+    ],
     BY_KIND,
 ]
 

@@ -186,7 +186,7 @@ def read_recording(path: Path, columns: MeasurementBlock) -> Recording:
         columns = replace(columns, **usual)
     tables, places = find_tables(path, sheet, columns)
     parts = [_read_block(path, sheet, tables[place], columns) for place in places]
-    values, lines, units, form, remarks = _joined(columns, parts)
+    values, lines, units, form, remarks = _joined_blocks(columns, parts)
     load, chosen = None, np.concatenate([part.chosen for part in parts])
     _check_conditions(path, columns, values[chosen], lines[chosen], sheet, tables[places[0]])
     if columns.load is not None:
@@ -209,7 +209,7 @@ def read_recording(path: Path, columns: MeasurementBlock) -> Recording:
         **form,
         "header_line": int(sheet.numbers[table.at]) or None,
         "units_line": None if table.units_at is None else int(sheet.numbers[table.units_at]),
-        "block": _plain([place + 1 for place in places]) if several else None,
+        "block": columns.block or places[0] + 1 if several else None,
         "blocks": len(tables) if several else None,
         "preamble": table.title or None,
         "columns": dict(zip(columns.named, names_and_units, strict=True)),
@@ -222,7 +222,7 @@ def read_recording(path: Path, columns: MeasurementBlock) -> Recording:
 
 
 @dataclass(frozen=True)
-class _Block:
+class _TablePart:
     """What was read of a table."""
 
     indices: list[int]
@@ -239,7 +239,7 @@ class _Block:
     """What marks the numbers have."""
 
 
-def _read_block(path: Path, sheet: Sheet, table: Table, columns: MeasurementBlock) -> _Block:
+def _read_block(path: Path, sheet: Sheet, table: Table, columns: MeasurementBlock) -> _TablePart:
     header_line = int(sheet.numbers[table.at]) or None
     axis, rows = columns.axis_column, slice(table.first, table.end)
     times = [cell for i in table.indices(axis)[:1] for cell in sheet.cells[rows, i].tolist()]
@@ -257,11 +257,11 @@ def _read_block(path: Path, sheet: Sheet, table: Table, columns: MeasurementBloc
     indices, units = _columns_of(path, header_line, table, columns, clock=clock)
     values, form = _numbers(path, sheet, table, indices, clock=clock)
     chosen = _chosen(path, sheet, table, columns)
-    return _Block(indices, units, values, sheet.numbers[rows], chosen, form)
+    return _TablePart(indices, units, values, sheet.numbers[rows], chosen, form)
 
 
-def _joined(
-    columns: MeasurementBlock, parts: Sequence[_Block]
+def _joined_blocks(
+    columns: MeasurementBlock, parts: Sequence[_TablePart]
 ) -> tuple[Array, IntArray, list[str], dict[str, Any], tuple[str, ...]]:
     """Join blocks of one test: values in the first one's units, lines, units, form, remarks.
 
@@ -289,10 +289,6 @@ def _joined(
         joined_rows[:, 0] -= np.nanmin(joined_rows[:, 0])
     lines = np.concatenate([part.lines for part in parts])
     return joined_rows, lines, first.units, form, tuple(remarks)
-
-
-def _plain(numbers: list[int]) -> int | list[int]:
-    return numbers if numbers[1:] else numbers[0]
 
 
 def _last_two(times: Array) -> Array:

@@ -68,7 +68,7 @@ _GAPS = ("", "-", "na", "n/a", "#n/a", "#nv")
 # Looks like a number or a time, whatever its marks mean.
 _NUMERIC = re.compile(r"[-+]?\d[-+\d.,:;'\u2019\sTZeE]*|[-+]?[.,]\d[\deE+-]*")
 # What a spreadsheet writes of a failed formula.
-_FAILED = re.compile(r"#[A-Z]")
+_FAILED_FORMULA = re.compile(r"#[A-Z]")
 _MOST_HEADER_ROWS = 5
 _PREAMBLE_LINES_SHOWN = 3
 _NAMES_SHOWN = 8
@@ -426,7 +426,7 @@ def _is_of_header(cells: Sequence[str], columns: MeasurementBlock, read: Mapping
     in_columns = [cells[index] for index in read.values()]
     if unit_in_cell(cells[read[columns.axis]], columns.units_of(columns.axis)):
         return True
-    if any(_NUMERIC.fullmatch(cell) or _FAILED.match(cell) for cell in in_columns):
+    if any(_NUMERIC.fullmatch(cell) or _FAILED_FORMULA.match(cell) for cell in in_columns):
         return False
     words = any(cell.lower() not in _GAPS for cell in in_columns)
     return words or all(map(in_brackets, filter(None, cells)))
