@@ -127,6 +127,7 @@ def read_measurements(path: Path, seeds: list[int] | None = None) -> Measurement
         found.get("target"),
         chosen,
         sd=found.get("sd"),
+        correlation=found.get("correlation"),
         sd_known="sd_known" not in found,
         onset_s=None if onset_s is None else float(onset_s),
         remarks=tuple(map(str, found.get("remarks", ()))),
