@@ -209,3 +209,16 @@ right sweeps is refused."""
 
 FAR_ABOVE = 10.0
 """Multiple of a given noise from which a rotation is seen, however small it is."""
+
+# Rows of several conditions, and the noise of a sweep.
+
+CONDITIONS = 1e-3
+"""Level at which readings of equal times or frequencies are no repeats: of a thousand files with
+repeats one is taken for several conditions."""
+
+MEASURED_ALIKE = 0.01
+"""Share by which numbers of one condition scatter, as 19.9 and 20.1 for 20. Chosen."""
+
+LIKELIER = 6.0
+"""Deviance by which shares of each modulus are clearly likelier than an amplitude and a phase: by
+chance once in a hundred sweeps with the noise of these."""

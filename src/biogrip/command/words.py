@@ -14,6 +14,7 @@ from biogrip.judging.without_model import BEYOND, EXPONENT, FLOW, LEVEL, LOSS
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.models import CANDIDATES
 from biogrip.terminal import aligned, visible, visible_lines
+from biogrip.traces.columns import shape_and_sizes
 from biogrip.traces.measurement_block import KNOWN_NOISE
 
 # Instrument whose readings span decades: their misfit is told over their noise.
@@ -324,25 +325,20 @@ REFERENCE = (
 )
 """How biogrip is cited, as in CITATION.cff."""
 
-_INSTRUMENTS = {
-    "gripper": "The {} of an arm of a microgripper was recorded",
-    "creep": "In creep the {} was recorded",
-    "relaxation": "In relaxation the {} was recorded",
-    "oscillation": "In oscillation storage and loss moduli were recorded over frequency",
-}
 _MOST_PHASES, _MOST_REFUSED = 4, 3
 
 
 def set_up_in_words(found: Mapping[str, Any]) -> list[str]:
     """Return sentences on instrument, protocol, model, noise, limits and conditions of a trace."""
-    reads, assumed = found["reads"]["quantity"], found["assumed"]
-    under = "" if INSTRUMENTS[reads].sweeps else f" under {_protocol(found)}"
-    what = _INSTRUMENTS[found["instrument"]].format(reads.replace("_", " "))
-    said = [f"{what}{under}."]
-    if sphere := assumed["measurement"].get("sphere"):
+    instrument, assumed = INSTRUMENTS[found["reads"]["quantity"]], found["assumed"]
+    under = "" if instrument.sweeps else f" under {_protocol(found)}"
+    said = [f"{instrument.in_words}{under}."]
+    if text := assumed["measurement"].get("shape"):
+        shape, poisson = shape_and_sizes(text)[0], assumed["measurement"].get("poisson", 0.5)
+        of_tip = f", with Poisson's ratio {poisson:g}" * shape.is_tip
         said.append(
-            f"By Hertz's contact with a sphere of radius R = {sphere}, a force F is the stress "
-            "9F/(16R²) and an indentation d the strain (d/R)^1.5; moduli are Young's."
+            f"Moduli are Young's by the shape, {text}: {shape.law} ({shape.source}), where "
+            f"{shape.condition}{of_tip}."
         )
     if "gripper" in assumed:
         own = assumed["gripper"]

@@ -18,6 +18,7 @@ from biogrip.physics.models import Sample
 from biogrip.physics.noise import (
     WEIGHTED,
     NoiseModel,
+    PairWhitening,
     Whitening,
     nuisance_basis,
     stream,
@@ -61,6 +62,8 @@ class Experiment:
     """Standard deviation of the noise as a share of the readings, see `proportional_deviations`."""
     sd: Array | None = field(default=None, compare=False)
     """Standard deviations of the readings of a trace, see `weighted`, (n_samples,)."""
+    correlation: Array | None = field(default=None, compare=False)
+    """Correlation of the noise of both moduli of a sweep, see `PairWhitening`, (n_frequencies,)."""
     coloured: bool = False
     """True if the noise of a trace may be autocorrelated, see `fit_least_squares`."""
     uncertainty: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
@@ -140,7 +143,9 @@ class Experiment:
         exact = replace(self, uncertainty={}, load_errors=None, fit_contact=False)
         return replace(exact, ranges=ranges, coloured=False)
 
-    def weighted(self, sd: Array | None, *, known: bool = True) -> "Experiment":
+    def weighted(
+        self, sd: Array | None, *, known: bool = True, correlation: Array | None = None
+    ) -> "Experiment":
         """Divide the readings of a trace by their standard deviations, if these are known.
 
         The noise becomes white, with their root mean square as its standard deviation, which is not
@@ -148,7 +153,8 @@ class Experiment:
         """
         if sd is None:
             return self
-        return replace(self, sd=sd, noise_sd=float(np.sqrt(np.mean(sd**2))) if known else None)
+        noise_sd = float(np.sqrt(np.mean(sd**2))) if known else None
+        return replace(self, sd=sd, correlation=correlation, noise_sd=noise_sd)
 
     @property
     def offset_and_drift(self) -> int:
@@ -219,9 +225,9 @@ class Experiment:
 
     def rows_key(self, time_s: Array) -> Hashable:
         """Return what the rows of a trace depend on, whose times are (n_samples,)."""
-        sd, record = (None if of is None else of.tobytes() for of in (self.sd, self.record))
-        held = self.phases, record, self.instrument, self.offset, self.drift
-        return *held, sd, time_s.tobytes()
+        arrays = self.sd, self.correlation, self.record
+        held = self.phases, self.instrument, self.offset, self.drift
+        return *held, *(None if of is None else of.tobytes() for of in arrays), time_s.tobytes()
 
     def for_model(self, problem: TraceProblem, model: SampleModel) -> TraceProblem:
         """Return one of its problems posed for another model; both share rows of the trace."""
@@ -250,6 +256,8 @@ class Experiment:
         uncertain = nuisance[:0] if uncertain is None else uncertain
         rows = SweptRows if self.torque.sweeps else Condensed
         given = self.torque, self.torque.snapped(time_s)
+        if noise_model is None and self.sd is not None and self.correlation is not None:
+            return rows(*given, nuisance[:0], PairWhitening(time_s, self.sd, self.correlation))
         if noise_model is None and self.sd is not None:
             noise_model, growing = WEIGHTED, self.sd
         if noise_model is None:

@@ -101,11 +101,11 @@ def tare_of(experiment: Experiment, recording: Recording) -> float:
     """Return what is controlled in first rows that do not move, 0 if readings follow that.
 
     Whatever sample and offset, they would have to follow the record better without it; or as well,
-    if these rows precede the start; and without an offset not far worse. Of a sphere nothing is
-    linear.
+    if these rows precede the start; and without an offset not far worse. Before its contact a tip
+    has no tare.
     """
     record, load, start_s = experiment.record, recording.load, recording.read.start_s or 0.0
-    if record is None or load is None or experiment.instrument.relative or recording.read.sphere:
+    if record is None or load is None or experiment.instrument.relative or recording.read.has_tip:
         return 0.0
     same = np.abs(load[:, 1] - load[0, 1]) < levels.HELD * np.ptp(load[:, 1])
     first = load[: int(np.argmin(same)), 1]

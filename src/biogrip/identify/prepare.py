@@ -20,9 +20,10 @@ import biogrip.levels as levels
 from biogrip.arrays import Array
 from biogrip.digits import plain
 from biogrip.errors import BiogripError
-from biogrip.fit.any_sample import proportional_deviations, swept_deviations
+from biogrip.fit.any_sample import proportional_deviations
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.search_range import GeneRange
+from biogrip.fit.swept_noise import estimate_swept_noise
 from biogrip.identify.contact import with_contact
 from biogrip.identify.load_noise import with_its_steps, without_noise
 from biogrip.identify.plausibility import check_moduli, check_recording
@@ -121,7 +122,8 @@ def for_trace(experiment: Experiment, recording: Recording) -> Experiment:
     """Return the experiment with what follows from a recording: see `prepare`."""
     if experiment.coloured:
         experiment = _without_likenesses(experiment, recording.time_s)
-    experiment = experiment.weighted(recording.sd, known=recording.sd_known)
+    known, correlation = recording.sd_known, recording.correlation
+    experiment = experiment.weighted(recording.sd, known=known, correlation=correlation)
     ranges = ranges_of(experiment, recording.time_s, recording.readings)
     found = {name: it for name, it in ranges.items() if name not in experiment.given_ranges}
     return replace(experiment, ranges={**experiment.ranges, **found})
@@ -165,7 +167,7 @@ def _checked(trace: Recording, experiment: Experiment) -> Recording:
                 f"{place(trace.path)}: found {1 / longest_s:.3g} to {1 / shortest_s:.3g} rad/s, "
                 f"allowed with {experiment.model.name} are {1 / LONGEST_S:g} to {1 / SHORTEST_S:g}."
             )
-        return _with_deviations(trace, share, experiment.noise_sd)
+        return _with_deviations(trace, experiment)
     zeroed, _ = _with_zero(experiment, trace)
     if suspicion := check_recording(trace, zeroed, _noise(trace, experiment)):
         trace = replace(trace, remarks_before=(*trace.remarks_before, suspicion))
@@ -174,19 +176,21 @@ def _checked(trace: Recording, experiment: Experiment) -> Recording:
     return replace(trace, sd=proportional_deviations(experiment, trace.time_s, trace.readings))
 
 
-def _with_deviations(sweep: Recording, share: float | None, noise_sd: float | None) -> Recording:
+def _with_deviations(sweep: Recording, experiment: Experiment) -> Recording:
     """Return a sweep with standard deviations of its readings, or of their ratios."""
-    known = noise_sd if sweep.sd is None and share is None else sweep.sd
-    check_moduli(sweep, 0.0 if known is None else known)
-    if known is not None:
+    share, noise_sd = experiment.noise_share, experiment.noise_sd
+    if (known := noise_sd if sweep.sd is None and share is None else sweep.sd) is not None:
+        check_moduli(sweep, known)
         return sweep
-    sd, shares = swept_deviations(sweep.time_s, sweep.readings, share, noise_sd or 0.0)
+    sizes = [size for size in (share, sweep.read.phase_sd_rad) if size is not None]
+    noise = estimate_swept_noise(sweep.time_s, sweep.readings, sizes or None, noise_sd or 0.0)
+    check_moduli(sweep, noise.sd)
+    sweep = replace(sweep, sd=noise.sd, correlation=noise.correlation)
     if share is not None:
-        return replace(sweep, sd=sd)
-    percents = [f"{plain(100 * of, 2)} % of the {name} modulus" for name, of in shares.items()]
-    how = f"as they scatter from one frequency to the next: by {' and '.join(percents)}"
+        return sweep
+    how = f"as they scatter from one frequency to the next: by {noise.words}"
     said = (*sweep.remarks_before, f"Readings are weighted {how}.")
-    return replace(sweep, sd=sd, sd_known=False, remarks_before=said)
+    return replace(sweep, sd_known=False, remarks_before=said)
 
 
 def without_steps(trace: Recording, protocol: Course) -> Recording:

@@ -167,7 +167,7 @@ def examine_residuals(likelihood: Likelihood) -> tuple[Likelihood, FindNotes]:
         # What a fit with these weights would leave, to first order.
         standard = without(basis, standard)
     struck = outliers_of(whiteness.by_leverage(standard, basis), rounding)
-    if whiteness.far_out(standard, struck, basis) >= levels.FALSE_ALARM:
+    if whiteness.far_out(standard, struck, basis, residuals.freedom) >= levels.FALSE_ALARM:
         struck[:] = False
     # Outliers are noise of the recording: they make a fit doubtful, not wrong.
     basis = absorbed(basis[:, ~struck]) if struck.any() else basis

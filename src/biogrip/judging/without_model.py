@@ -42,6 +42,7 @@ from biogrip.judging.verdicts import verdict_of
 from biogrip.judging.what_moves import Move, as_moves, find_mistakes
 from biogrip.judging.whiteness import as_correlated, correlated
 from biogrip.physics.residuals import Residuals
+from biogrip.physics.units import inverse_of, per_second_of
 
 # First digits of the times at which quantities are told and, where these are too few, of more.
 _FIRST_DIGITS, _FEWEST_TIMES = ((1,), (1, 2, 5)), 2
@@ -56,13 +57,6 @@ _INNER = 2.0
 # Standard deviation of a quantity that counts as none, over the largest that a noise of one lag
 # makes; and a quantity that does, over its standard deviation.
 _LEAST_DEVIATION, _NO_VALUE = 1e-3, 1e-15
-
-# Of moduli, compliances, their slopes, and viscosities: N and m, or Pa.
-_UNITS_TOLD = {
-    "N/m": ("N/m", "m/N", "m/(N s)", "N s/m"),
-    "Pa": ("Pa", "1/Pa", "1/(Pa s)", "Pa s"),
-    "": ("", "", "1/s", "s"),
-}
 
 LEVEL, EXPONENT, LOSS, BEYOND, FLOW = "level", "exponent", "loss", "beyond", "flow"
 KINDS = (LEVEL, EXPONENT, LOSS, BEYOND, FLOW, "storage", "loss tangent", "increment", "slope")
@@ -425,10 +419,10 @@ def _quantities(residuals: Residuals, lags: Lags, times: Sequence[float]) -> Ite
     inside = [time_s for time_s in times if first_s <= time_s <= last_s]
     # Slopes and moduli at an end of the trace are hardly known.
     inner = [time_s for time_s in inside if _INNER * first_s <= time_s <= last_s / _INNER]
-    stiffness = instrument.stiffness
-    letter, (unit, *of_creep) = "K" if stiffness == "N/m" else "G", _UNITS_TOLD[stiffness]
+    unit, viscosity = instrument.stiffness, per_second_of(instrument.stiffness)
+    letter = "K" if "/" in unit else "G"
     if not (deforms or jaws):
-        letter, unit = "J", of_creep[0]
+        letter, unit = "J", inverse_of(unit)
     # What falls is not smaller before the first reading, and not larger after the last one.
     falls, level = (1, _ADDED["left"]) if deforms else (-1, _ADDED["yielded"])
     for at_s in times:
@@ -446,7 +440,7 @@ def _quantities(residuals: Residuals, lags: Lags, times: Sequence[float]) -> Ite
         for before_s, at_s in pairwise(inside):
             name = f"J({before_s:g} to {at_s:g} s)"
             yield _Functional(name, "increment", at_s, unit, partial(_rise, before_s))
-        _, per_s, viscosity = of_creep
+        per_s = inverse_of(viscosity)
         yield _Functional("slope at the end", "slope", last_s, per_s, _ADDED["per second"])
         flow = _ADDED["flowing"]
         yield _Functional("viscosity", FLOW, None, viscosity, flow, None, (1,), lambda it: 1 / it)

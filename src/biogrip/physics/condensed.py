@@ -28,7 +28,7 @@ from numpy.polynomial import chebyshev, legendre
 
 from biogrip.arrays import Array
 from biogrip.physics.modes import Modes, mode_responses, responses_in_turn, sum_of_modes
-from biogrip.physics.noise import Whitening, without
+from biogrip.physics.noise import PairWhitening, Whitening, without
 from biogrip.physics.protocol import Course
 from biogrip.physics.rate_tables import ModeRows, SpanningModes
 
@@ -130,7 +130,7 @@ class Condensed:
     """Ascending sampling times, (n_samples,)."""
     functions: Array
     """Functions projected out, (n_functions, n_samples), but by whitening (`with_uncertain`)."""
-    whitening: Whitening | None = None
+    whitening: Whitening | PairWhitening | None = None
     """Transformation that whitens noise and projects nuisance out; None for white noise."""
 
     @property
