@@ -225,7 +225,7 @@ def _late_clock(rng: Rng) -> tuple[Array, Course]:
 def _held_later(rng: Rng) -> tuple[Array, Course]:
     """Return a hold that comes between two rows, after 2 s, and lasts for 20 to 60 s."""
     at_s = 2.0 + float(rng.uniform(0.0, 0.2))
-    return _rows(rng, float(rng.uniform(20.0, 60.0)), 0.2), lambda t: 1.0 * (np.asarray(t) >= at_s)
+    return _rows(rng, float(rng.uniform(20.0, 60.0)), 0.2), lambda t: np.where(t >= at_s, 1.0, 0.0)
 
 
 def _mid_phase(rng: Rng) -> tuple[Array, Course]:
@@ -292,7 +292,7 @@ def presses(rng: Rng) -> Trace:
 
 def rises(rng: Rng) -> Trace:
     """Return the stress of a Zener solid under a strain of 1 that is reached within 2 s."""
-    truth, time_s = _zener(rng, 60.0), np.arange(1, 301) * 0.2
+    truth, time_s = _zener(rng, 60.0), np.arange(1.0, 301.0) * 0.2
     k, k_p, c = truth.values()
     tau, inside = c / k, np.minimum(time_s, 2.0)
     spring = tau * (np.exp(-(time_s - inside) / tau) - np.exp(-time_s / tau)) / 2.0

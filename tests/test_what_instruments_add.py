@@ -9,7 +9,7 @@ from biogrip.arrays import Array
 from tests.helpers.identified import by_quantity, identified, identify, write_trace
 
 K, K_P, TAU_S = 80.0, 100.0, 20.0
-AFTER_S: Array = np.arange(1, 201) * 0.5
+AFTER_S: Array = np.arange(1.0, 201.0) * 0.5
 RELAXATION = ("--model", "zener_maxwell", "--no-compare", "--start", "0")
 
 

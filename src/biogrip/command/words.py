@@ -84,15 +84,16 @@ def rows_of_moves(found: Mapping[str, Any]) -> list[tuple[str, dict[str, float]]
 
 
 def moves_in_words(found: Mapping[str, Any]) -> list[str]:
-    """Return a line on the error that moves a quantity most, of the model's and of any sample's."""
-    said, of_model = [], {each["quantity"] for each in found["quantities"]}
-    every = [(by, name, words) for words, row in rows_of_moves(found) for name, by in row.items()]
-    for by_model in (True, False):
+    """Return a line on what a zero moves most, and what is moved most, by the model and by any."""
+    rows, of_model = rows_of_moves(found), {each["quantity"] for each in found["quantities"]}
+    said: dict[str, None] = {}
+    for some, by_model in ((rows[:1], True), (rows, True), (rows, False)):
+        every = [(by, name, words) for words, row in some for name, by in row.items()]
         chosen = [each for each in every if (each[1] in of_model) == by_model]
         by, name, words = max(chosen, key=lambda it: abs(it[0]), default=(0.0, "", ""))
         if abs(by) > _LEAST_MOVE:
             way = f"{'falls' if by < 0 else 'rises'} by {plain(100 * abs(by), 2)} %"
-            said.append(f"{name} {way} if {words}")
+            said[f"{name} {way} if {words}"] = None
     return [f"{'; '.join(said)}."] if said else []
 
 

@@ -121,7 +121,7 @@ def _more(
     free = len(rest) - len(basis) - len(alone)
     if free < 1:
         return np.ones(len(alone)), np.zeros(len(alone)), 1.0
-    more = np.linalg.lstsq(alone.T, -rest)[0]
+    more = np.asarray(np.linalg.lstsq(alone.T, -rest)[0], np.float64)
     after = rest + more @ alone
     square = float(after @ after) / free
     chance = fdtrc(len(alone), free, float(rest @ rest - after @ after) / len(alone) / square)
