@@ -5,11 +5,13 @@ Numbers are drawn here by NumPy alone; nothing of the method is used but `compar
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from scipy.special import ndtri
 
 from biogrip.judging.cells import Cell, compare
+from tests.helpers.places import ROOT
 
 TABLES = 1000
 Known = dict[str, tuple[float, float]]
@@ -124,3 +126,16 @@ _POWER = {
 }
 DOCUMENTED = _DISHES | _DAYS | _BOUNDED | _POWER
 """Designs by what docs/groups.md calls them."""
+
+
+def write_shares(document: Path) -> None:
+    """Write the table of docs/groups.md anew."""
+    before, begin, rest = document.read_text(encoding="utf-8").partition("| --- | --- |\n| 3 and 3")
+    rows = (f"| {name} | {in_words(design)} |" for name, design in DOCUMENTED.items())
+    after = rest[rest.index("\n\n<!-- shares: end") :]
+    text = before + begin.partition("\n")[0] + "\n" + "\n".join(rows) + after
+    document.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    write_shares(ROOT / "docs" / "groups.md")
