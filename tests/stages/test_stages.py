@@ -79,12 +79,12 @@ def test_without_noise_the_fit_is_the_truth_and_not_the_rounding_of_digits(tmp_p
 
 
 def test_of_a_target_of_another_sample_its_parameters_are_expected(tmp_path: Path) -> None:
-    """Not those that the case is said to have, which fit it worse."""
+    """Not those that the case is said to have, which fit it worse, by less than profiles show."""
     case, file = STUDY.case("endothelial_cell"), tmp_path / "expected.json"
-    stiffer = study_of("cases: {endothelial_cell: {sample: {k: 70.0}}}").case("endothelial_cell")
+    stiffer = study_of("cases: {endothelial_cell: {sample: {k: 35.2}}}").case("endothelial_cell")
     target.simulate_target(stiffer, tmp_path / "target.csv")
     expect(case, tmp_path / "target.csv", [], file)
     values = {row["quantity"]: row["value"] for row in json.loads(file.read_text())["quantities"]}
-    # Fits leave out the inertia that targets have.
-    assert values["k"] == pytest.approx(70.0, rel=5e-3)
+    # Fits leave out the inertia that targets have; 35.0 is off by 6e-3.
+    assert values["k"] == pytest.approx(35.2, rel=3e-3)
     assert values["k_p"] == pytest.approx(12.3, rel=1e-3)

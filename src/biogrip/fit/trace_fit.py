@@ -246,33 +246,33 @@ def fit_least_squares(
 
     def find(problems: Sequence[TraceProblem], which: Sequence[int]) -> list[Fit]:
         of_traces = [rngs[trace] for trace in which]
-        found = identify_many(problems, experiments[0].least_squares, of_traces, progress)
-        return deepen(problems, found)
+        fits = identify_many(problems, experiments[0].least_squares, of_traces, progress)
+        return deepen(problems, fits)
 
     plain = [trace for trace, experiment in enumerate(experiments) if experiment.plain]
     problems = pose([experiments[trace] for trace in plain], [traces[trace] for trace in plain])
     optima = find(problems, plain) if plain else []
-    found = {
+    fits_by_trace = {
         trace: TraceFit(problem, optimum, None, np.zeros(len(traces[trace][0]), dtype=bool))
         for trace, problem, optimum in zip(plain, problems, optima, strict=True)
     }
     for trace, experiment in enumerate(experiments):
-        if trace not in found:
+        if trace not in fits_by_trace:
             alone = partial(find, which=[trace])
-            found[trace] = _fit_in_noise(experiment, *traces[trace], alone)
-    return [found[trace] for trace in range(len(traces))]
+            fits_by_trace[trace] = _fit_in_noise(experiment, *traces[trace], alone)
+    return [fits_by_trace[trace] for trace in range(len(traces))]
 
 
 def _fit_in_noise(experiment: Experiment, time_s: Array, readings: Array, find: Find) -> TraceFit:
-    kept, plain, found = _without_outliers(experiment, time_s, readings, find)
+    kept, plain, best_fit = _without_outliers(experiment, time_s, readings, find)
     time_s, readings = time_s[kept], readings[kept]
-    problem, found, noise_model, errors = _in_turn(experiment, time_s, readings, plain, found)
+    problem, best_fit, noise_model, errors = _in_turn(experiment, time_s, readings, plain, best_fit)
     # Slow deviations now weigh less, so that another basin may be the deepest.
     (other,) = find([problem])
-    if np.float32(other.misfit) < np.float32(found.misfit):
-        found = other
+    if np.float32(other.misfit) < np.float32(best_fit.misfit):
+        best_fit = other
     along = _terms_fitted_along(experiment, time_s)
-    return TraceFit(problem, found, noise_model, ~kept, errors, along)
+    return TraceFit(problem, best_fit, noise_model, ~kept, errors, along)
 
 
 def _terms_fitted_along(experiment: Experiment, time_s: Array) -> str:
@@ -292,17 +292,17 @@ def _without_outliers(
     """Strike outliers, if the noise may have any, and fit again, until there are no more."""
     kept, plain = np.ones(len(time_s), dtype=bool), experiment.of(time_s, readings)
     for _ in range(_MOST_ROUNDS):
-        (found,) = find([plain])
+        (best_fit,) = find([plain])
         if not experiment.coloured:
             break
-        residual = plain.residuals.left(np.log(found.parameters))
-        growth = growth_left(plain.residuals, np.log(found.parameters))
+        residual = plain.residuals.left(np.log(best_fit.parameters))
+        growth = growth_left(plain.residuals, np.log(best_fit.parameters))
         struck = outliers_of(residual / growth, plain.residuals.trace.rounding)
         if not struck.any():
             break
         kept[np.flatnonzero(kept)[struck]] = False
         plain = experiment.of(time_s[kept], readings[kept])
-    return kept, plain, found
+    return kept, plain, best_fit
 
 
 def _in_turn(
@@ -310,24 +310,24 @@ def _in_turn(
     time_s: Array,
     readings: Array,
     plain: TraceProblem,
-    found: Fit,
+    best_fit: Fit,
 ) -> tuple[TraceProblem, Fit, NoiseModel | None, tuple[float, float]]:
     """Estimate the noise from the residuals and fit again with it, until the fit converges."""
     problem, noise_model = plain, None
-    growth = growth_left(plain.residuals, np.log(found.parameters))
+    growth = growth_left(plain.residuals, np.log(best_fit.parameters))
     grows = experiment.coloured and np.ptp(growth) > 0
     for _ in range(_MOST_ROUNDS):
-        start = np.log(found.parameters)
+        start = np.log(best_fit.parameters)
         residual, sensitivity = plain.residuals(start)
-        of_load = load_functions(experiment, time_s, found.parameters, sensitivity)
-        uncertain = gripper_functions(experiment, time_s, found.parameters)
+        of_load = load_functions(experiment, time_s, best_fit.parameters, sensitivity)
+        uncertain = gripper_functions(experiment, time_s, best_fit.parameters)
         uncertain = np.vstack((uncertain, of_load))
         if experiment.fit_contact:
-            of_contact = contact_function(experiment, time_s, found.parameters)
+            of_contact = contact_function(experiment, time_s, best_fit.parameters)
             free = _FREE_OVER_NOISE * np.linalg.norm(residual) / np.linalg.norm(of_contact)
             uncertain = np.vstack((uncertain, free * of_contact))
-        left = problem.residuals.free - len(found.parameters)
-        noise_sd = experiment.noise_sd or found.misfit * np.sqrt(len(time_s) / left)
+        left = problem.residuals.free - len(best_fit.parameters)
+        noise_sd = experiment.noise_sd or best_fit.misfit * np.sqrt(len(time_s) / left)
         if len(of_load) and experiment.noise_sd is None:
             noise_sd = noise_beside(residual, of_load, left)
         before: NoiseModel | None = noise_model
@@ -339,7 +339,7 @@ def _in_turn(
             noise_model = likelihood.best(near=before)
         condensed = experiment.in_noise(time_s, noise_model, uncertain / noise_sd, growing=growing)
         problem = experiment.of(time_s, readings, condensed=condensed)
-        found = found.at(fit := fit_from([problem], start))
+        best_fit = best_fit.at(fit := fit_from([problem], start))
         slopes = problem.residuals.condensed_responses(fit.x)[0, 1:]
         moved = np.linalg.norm((fit.x[0] - start) @ slopes) / noise_sd
         if moved < _FIT_SETTLED and _has_settled(before, noise_model):
@@ -349,7 +349,7 @@ def _in_turn(
         errors = likelihood.errors(noise_model)
         freedom = likelihood.freedom(noise_model, sensitivity / noise_sd, nuisance)
         problem = replace(problem, residuals=replace(problem.residuals, freedom=freedom))
-    return problem, found, noise_model, errors
+    return problem, best_fit, noise_model, errors
 
 
 def _has_settled(one: NoiseModel | None, other: NoiseModel | None) -> bool:

@@ -68,14 +68,14 @@ class Points:
         while np.any(news):
             start = np.tile(np.flatnonzero(news), 2)
             point = start + np.repeat((-1, 1), len(start) // 2)
-            own = to_fit[point] == self.profile[start]
-            news = self._try(point[own], start[own], CLOSE)
+            beside = to_fit[point] == self.profile[start]
+            news = self._try(point[beside], start[beside], CLOSE)
 
     def _try(self, point: IntArray, start: IntArray, tolerance: float) -> BoolArray:
         """Fit points from other points' fits; return a mask of those that have improved much."""
         profile, targets = self.profile[point], self.values[point]
-        found = self.fits.at(profile, targets, self.x[start], tolerance)
-        return keep_lower(self.increases, self.x, point, *found)
+        fits = self.fits.at(profile, targets, self.x[start], tolerance)
+        return keep_lower(self.increases, self.x, point, *fits)
 
     def ends(self) -> IntArray:
         """Return the indices of the first and last point of every profile, (2, n_profiles)."""
@@ -130,11 +130,13 @@ class Points:
 
 
 def keep_lower(
-    increases: Array, x: Array, point: IntArray, found: Array, fitted: Array
+    increases: Array, x: Array, point: IntArray, fitted_increases: Array, fitted: Array
 ) -> BoolArray:
     """Keep lower fits of points, one or more each, in place; return which improved much."""
     news = np.zeros(len(increases), dtype=bool)
-    for at, increase, parameters in zip(point.tolist(), found.tolist(), fitted, strict=True):
+    for at, increase, parameters in zip(
+        point.tolist(), fitted_increases.tolist(), fitted, strict=True
+    ):
         before = increases[at]
         if increase < before:
             news[at] |= increase < before - _LEAST_IMPROVEMENT * (1 + abs(increase))
@@ -180,28 +182,36 @@ def compute_profiles(
     likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity], *, smooth: bool = True
 ) -> list[list[Profile]]:
     """Compute profiles and limits by trace and quantity, with points for a drawing if `smooth`."""
-    found: dict[int, list[Profile]] = {}
+    by_trace: dict[int, list[Profile]] = {}
     count = len(quantities)
     for group in alike([likelihood.problem for likelihood in likelihoods]):
         fits = ConstrainedFits([likelihoods[index] for index in group], quantities)
-        own = _profiles(fits, smooth=smooth)
+        profiles = _profiles(fits, smooth=smooth)
         for place, index in enumerate(group.tolist()):
-            found[index] = own[place * count : (place + 1) * count]
-    return [found[index] for index in range(len(likelihoods))]
+            by_trace[index] = profiles[place * count : (place + 1) * count]
+    return [by_trace[index] for index in range(len(likelihoods))]
 
 
 def _profiles(fits: ConstrainedFits, *, smooth: bool) -> list[Profile]:
-    grids = [_grid_of(each, quantity) for each in fits.likelihoods for quantity in fits.quantities]
+    grids = [
+        _grid_of(likelihood, quantity)
+        for likelihood in fits.likelihoods
+        for quantity in fits.quantities
+    ]
     points = Points(fits, grids)
     points.from_optimum()
     points.from_neighbours()
     limits = _find_crossings(points).T
     if smooth:
         points.smooth(limits)
-    found = []
+    profiles = []
     for index, ends in enumerate(limits.tolist()):
-        own = points.profile == index
-        values, increases, x = points.values[own], points.increases[own], points.x[own]
+        in_profile = points.profile == index
+        values, increases, x = (
+            points.values[in_profile],
+            points.increases[in_profile],
+            points.x[in_profile],
+        )
         gaps = find_gaps(values, increases, float(fits.threshold[index]))
         lowest = x[int(np.argmin(increases))]
         short = (increases[[0, -1]] > fits.threshold[index]) & np.isnan(ends)
@@ -216,10 +226,10 @@ def _profiles(fits: ConstrainedFits, *, smooth: bool) -> list[Profile]:
         low, high = (None if np.isnan(end) or end in made else end for end in ends)
         if slowest_s is not None:
             low, high, gaps, certainty = None, None, (), None
-        found.append(
+        profiles.append(
             Profile(values, increases, best, low, high, lowest, gaps, certainty, slowest_s)
         )
-    return found
+    return profiles
 
 
 def _grid_of(likelihood: Likelihood, quantity: Quantity) -> Array:
@@ -239,18 +249,21 @@ def _find_crossings(points: Points) -> Array:
     end, profile = np.nonzero(points.increases[ends] > fits.certainty)
     while len(profile):
         below = np.flatnonzero(points.increases < fits.threshold[points.profile])
-        own = points.profile[below]
-        first, last = np.searchsorted(own, profile), np.searchsorted(own, profile, "right") - 1
+        of_below = points.profile[below]
+        first, last = (
+            np.searchsorted(of_below, profile),
+            np.searchsorted(of_below, profile, "right") - 1,
+        )
         inside = below[np.where(end == 0, first, last)]
         outside = np.where(end == 0, inside - 1, inside + 1)
         both = np.stack((inside, outside))
         values, increases, x = points.values[both], points.increases[both], points.x[both]
         elsewhere = points.extremes()[:, fits.trace[profile]]
-        found = crossings(fits, profile, values, increases, x, elsewhere)
-        crossed[end, profile] = found
+        limits = crossings(fits, profile, values, increases, x, elsewhere)
+        crossed[end, profile] = limits
         points.increases[both], points.x[both] = increases, x
         # Where the outer point has come below the threshold, the next bracket is further out.
-        on = np.isnan(found) & (outside != ends[end, profile])
+        on = np.isnan(limits) & (outside != ends[end, profile])
         end, profile = end[on], profile[on]
     return crossed
 
@@ -362,11 +375,11 @@ def find_gaps(
 ) -> tuple[tuple[float, float], ...]:
     """Find stretches above the threshold, with ends interpolated in the root of the increase."""
     roots = np.sqrt(np.maximum(increases, 0.0))
-    found = []
+    gaps = []
     for start, end in pairwise(np.flatnonzero(increases < threshold).tolist()):
         if end > start + 1 and increases[start + 1 : end].max() > levels.GAP * threshold:
             # Places for `np.interp` ascend from inside to outside.
             sides = [start, start + 1], [end, end - 1]
             first, last = (np.interp(np.sqrt(threshold), roots[of], log_values[of]) for of in sides)
-            found.append((float(first), float(last)))
-    return tuple(found)
+            gaps.append((float(first), float(last)))
+    return tuple(gaps)

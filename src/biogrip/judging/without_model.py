@@ -81,7 +81,7 @@ _ADDED: dict[str, _Added] = {
 
 
 @dataclass(frozen=True)
-class Estimate:
+class LinearLimits:
     """A quantity, and its limits over all linear samples."""
 
     quantity: str
@@ -118,7 +118,7 @@ class Estimate:
 class WithoutModel:
     """What a trace tells without a model."""
 
-    told: list[Estimate]
+    told: list[LinearLimits]
     """Quantities with their limits."""
     misfit: float
     """RMS of what the linear sample that fits best leaves, in the unit of the readings."""
@@ -134,12 +134,24 @@ class WithoutModel:
     def widened(self, others: Sequence["WithoutModel"]) -> "WithoutModel":
         """Return it with limits that hold those of others, too, as of other starts."""
         told = []
-        for own in self.told:
-            every = [own, *(it for of in others for it in of.told if it.quantity == own.quantity)]
-            lows, highs = np.array([(it.low, it.high) for it in every], dtype=float).T
+        for estimate in self.told:
+            every = [
+                estimate,
+                *(
+                    other
+                    for of in others
+                    for other in of.told
+                    if other.quantity == estimate.quantity
+                ),
+            ]
+            lows, highs = np.array([(other.low, other.high) for other in every], dtype=float).T
             ends = [lows.min(), highs.max()] if len(every) > len(others) else [np.nan, np.nan]
             low, high = (None if np.isnan(end) else float(end) for end in ends)
-            told.append(replace(own, value=own.value if low and high else None, low=low, high=high))
+            told.append(
+                replace(
+                    estimate, value=estimate.value if low and high else None, low=low, high=high
+                )
+            )
         return replace(self, told=told)
 
     def data(self) -> dict[str, Any]:
@@ -151,8 +163,8 @@ class WithoutModel:
             "covered_s": list(self.covered_s),
             "moves": [asdict(move) for move in self.moves],
             "quantities": [
-                {**asdict(each), "verdict": each.verdict, "in_words": each.words()}
-                for each in self.told
+                {**asdict(estimate), "verdict": estimate.verdict, "in_words": estimate.words()}
+                for estimate in self.told
             ],
         }
 
@@ -278,13 +290,13 @@ class _Functional:
 
 def _find_limits(
     fit: AnySampleFit, quantity: _Functional, root: Callable[[int], float]
-) -> Estimate:
+) -> LinearLimits:
     """Find the limits of a quantity that is not negative."""
     profile = _Excess(fit, quantity, root)
     value: float | None = profile.best
     ends = [profile.limit(side) if side in quantity.sides else None for side in (-1, 1)]
     if (turned := quantity.turned) is not None:
-        value, *ends = (turned(it) if it else None for it in (value, *ends[::-1]))
+        value, *ends = (turned(end) if end else None for end in (value, *ends[::-1]))
     low, high = (float(end) if end is not None and end > 0 else None for end in ends)
     if quantity.below is not None and max(value or 0.0, high or 0.0) > levels.OF_THE_FASTEST:
         value, high = None, None
@@ -294,7 +306,9 @@ def _find_limits(
     if low is not None and low < little:
         low = None
     value = None if low is None or high is None or value is None else float(value)
-    return Estimate(quantity.name, quantity.kind, quantity.at_s, quantity.unit, value, low, high)
+    return LinearLimits(
+        quantity.name, quantity.kind, quantity.at_s, quantity.unit, value, low, high
+    )
 
 
 class _Excess:
@@ -309,15 +323,17 @@ class _Excess:
         divisor = float(below @ fit.amplitudes) if quantity.below else 1.0
         self.best = float(above @ fit.amplitudes) / divisor if divisor else math.nan
         """The value of the best fit, NaN if it has none."""
-        row, own, faint = above - self.best * below, fit.amplitudes > 0, fit.lags.faint
+        row, taken, faint = above - self.best * below, fit.amplitudes > 0, fit.lags.faint
         clearly = float(np.abs(row[~faint]).max())
-        deviation = float(np.linalg.norm(np.linalg.lstsq(fit.lags.rows[own], row[own])[0]))
+        deviation = float(np.linalg.norm(np.linalg.lstsq(fit.lags.rows[taken], row[taken])[0]))
         deviation = deviation if deviation > _LEAST_DEVIATION * clearly else clearly
         stride = root(0) * deviation / (divisor or 1.0)
         # Of a liquid the modulus that another is divided by may vanish.
         self._stride = min(stride, levels.OF_THE_FASTEST) if quantity.below else stride
         self._deviation, self._divisor = deviation, divisor
-        self._open = [it for it in (-1, 1) if np.any(it * row[faint] > levels.HANGS * clearly)]
+        self._open = [
+            side for side in (-1, 1) if np.any(side * row[faint] > levels.HANGS * clearly)
+        ]
 
     def limit(self, side: int) -> float | None:
         """Find the limit on a side, -1 or 1, if there is one."""
@@ -325,24 +341,24 @@ class _Excess:
         nothing = side < 0 and self.best <= _NO_VALUE * self._stride
         if not 0 < self._stride < math.inf or side in self._open or nothing:
             return None
-        found, needed = self._closely(side, self.best + side * self._stride, self._root(0))
+        limit, needed = self._closely(side, self.best + side * self._stride, self._root(0))
         more = count_lags(self._fit.amplitudes > 0) - count_lags(needed)
-        if found is not None and more > 0:
-            found, _ = self._closely(side, found, self._root(more))
-        return found
+        if limit is not None and more > 0:
+            limit, _ = self._closely(side, limit, self._root(more))
+        return limit
 
     def _closely(self, side: int, value: float, root: float) -> tuple[float | None, BoolArray]:
         """Find a limit roughly, then with closer lags, beginning with a value; and its lags."""
         lags, accuracy = self._fit.lags, _ROUGH_ROOT
         for _ in range(_MOST_GRIDS):
-            found, needed = self._crossing(lags, side, value, root, accuracy)
-            if found is None or side * (found - self.best) < 0:
+            limit, needed = self._crossing(lags, side, value, root, accuracy)
+            if limit is None or side * (limit - self.best) < 0:
                 # Where the excess jumps, Newton's method may end on the other side.
                 return None, needed
             if accuracy < _ROUGH_ROOT and lags.are_close(needed):
                 break
-            lags, value, accuracy = lags.divided(needed), found, _ACCURATE_ROOT
-        return found, needed
+            lags, value, accuracy = lags.divided(needed), limit, _ACCURATE_ROOT
+        return limit, needed
 
     def _crossing(
         self, lags: Lags, side: int, value: float, root: float, accuracy: float
@@ -443,18 +459,20 @@ def _quantities(residuals: Residuals, lags: Lags, times: Sequence[float]) -> Ite
         per_s = inverse_of(viscosity)
         yield _Functional("slope at the end", "slope", last_s, per_s, _ADDED["per second"])
         flow = _ADDED["flowing"]
-        yield _Functional("viscosity", FLOW, None, viscosity, flow, None, (1,), lambda it: 1 / it)
+        yield _Functional(
+            "viscosity", FLOW, None, viscosity, flow, None, (1,), lambda flow: 1 / flow
+        )
     # Under a step of the deformation the fastest lag, of a damper, does not show.
     fastest = 1 / first_s if deforms and not lags.rows[-1].any() else math.inf
     stored, lost = _ADDED["slow" if deforms else "fast"], _ADDED["lost"]
     for at_s in reversed(inner):
-        for name, kind, its, above, below in (
+        for name, kind, unit_of_it, above, below in (
             (f"{letter}'", "storage", unit, stored, None),
             (f"{letter}''", LOSS, unit, lost, None),
             ("tan delta", "loss tangent", "", lost, stored),
         ):
             name = f"{name}({1 / at_s:.3g} rad/s)"
-            yield _Functional(name, kind, at_s, its, above, below, fastest=fastest)
+            yield _Functional(name, kind, at_s, unit_of_it, above, below, fastest=fastest)
 
 
 def _rise(before_s: float, time_s: float, rates: Array) -> Array:

@@ -295,24 +295,24 @@ CANDIDATES: dict[str, Sample] = {
 @cache
 def contained(candidate: str) -> Mapping[str, tuple[Turned, ...]]:
     """Return the candidates nested in one, each with the fewest conversions of its parameters."""
-    found: dict[str, tuple[Turned, ...]] = {candidate: ()}
+    nested: dict[str, tuple[Turned, ...]] = {candidate: ()}
     ahead = [candidate]
     for richer in ahead:
         for name, turned in CANDIDATES[richer].model.contains.items():
-            if name not in found:
-                found[name] = (turned, *found[richer])
+            if name not in nested:
+                nested[name] = (turned, *nested[richer])
                 ahead.append(name)
-    del found[candidate]
-    return found
+    del nested[candidate]
+    return nested
 
 
 def different_in(candidate: str, others: Collection[str]) -> list[str]:
     """Return those of `others` that are nested in one, and one of models that are equivalent."""
-    found: list[str] = []
+    different: list[str] = []
     for name in filter(others.__contains__, contained(candidate)):
-        if not any(name in contained(other) and other in contained(name) for other in found):
-            found.append(name)
-    return found
+        if not any(name in contained(other) and other in contained(name) for other in different):
+            different.append(name)
+    return different
 
 
 def as_richer(candidate: str, simpler: str, parameters: Array) -> Array:

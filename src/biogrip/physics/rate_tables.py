@@ -57,7 +57,7 @@ _CHEBYSHEV_POWERS = (
     Chebyshev.basis(n, domain=(0, 1)).convert(kind=Polynomial).coef for n in _ORDERS
 )
 _TO_POWERS: Array = np.array(
-    [np.pad(each, (0, len(_ORDERS) - len(each))) for each in _CHEBYSHEV_POWERS]
+    [np.pad(powers, (0, len(_ORDERS) - len(powers))) for powers in _CHEBYSHEV_POWERS]
 )
 
 
