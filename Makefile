@@ -149,7 +149,7 @@ pinned: $(TEST_READY)
 # and benchmarks, add to both, of which they may need what is there for PyPy only.
 lock: $(READY)
 	$(call installer,.venv)
-	$(LOCK) pyproject.toml --output-file requirements.lock
+	$(LOCK) pyproject.toml --extra study --output-file requirements.lock
 	for extra in dev:requirements-dev.lock slurm:requirements-slurm.lock bench:benchmarks/requirements.lock; do \
 	  locks=requirements.lock; test $${extra%%:*} = dev || locks="$$locks requirements-dev.lock"; \
 	  $(LOCK) pyproject.toml --extra $${extra%%:*} $$(printf -- '--constraints %s ' $$locks) --output-file $${extra#*:} \
@@ -160,7 +160,7 @@ lock: $(READY)
 	$(subst 3.11,3.12,$(LOCK)) pyproject.toml benchmarks/field/requirements.in \
 	  --output-file benchmarks/field/requirements.lock
 	$(LOCK) --group docs --output-file docs/requirements.lock
-	$(LOCK) pyproject.toml --extra dev --extra bench --resolution lowest-direct --output-file requirements-lowest.lock
+	$(LOCK) pyproject.toml --extra study --extra dev --extra bench --resolution lowest-direct --output-file requirements-lowest.lock
 
 # Of the results only what rules make; overlays/ has folders of results with their own.
 clean:

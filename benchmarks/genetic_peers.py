@@ -1,8 +1,8 @@
 """The paper's genetic algorithm in the libraries of others.
 
-Each has the operators of `biogrip.fit.genetic` as nearly as its interface allows, and as fast:
-truncation selection, random disjoint pairs, single-point crossover, and from `mutation_start` on
-one gene redrawn in half of the children. All see the same misfit of whole batches.
+Each has the operators of `biogrip_study.methods.genetic` as nearly as its interface allows, and as
+fast: truncation selection, random disjoint pairs, single-point crossover, and from `mutation_start`
+on one gene redrawn in half of the children. All see the same misfit of whole batches.
 """
 
 import random
@@ -21,8 +21,8 @@ from pymoo.operators.selection.rnd import RandomSelection
 from pymoo.optimize import minimize
 
 from biogrip.arrays import Array, IntArray
-from biogrip.fit.genetic import GeneticSettings
-from biogrip.fit.genome import Genome
+from biogrip_study.methods.genetic import GeneticSettings
+from biogrip_study.methods.genome import Genome
 
 creator.create("Misfit", base.Fitness, weights=(-1.0,))
 creator.create("Chromosome", list, fitness=creator.Misfit)

@@ -11,7 +11,7 @@ from benchmarks.noisy_traces import BATCH, OURS, SIDE_BY_SIDE, NoisyTrace, noisy
 from benchmarks.report import Row, Section, number, times_ours
 from benchmarks.timing import Timed, clocked
 from biogrip.arrays import Array
-from biogrip.fit.genetic import GeneticSettings, identify_many
+from biogrip_study.methods.genetic import GeneticSettings, identify_many
 
 _GENERATIONS, _SEEDS = 80, 15
 # Misfits up to this share above the noise count as at its floor, as in the study.

@@ -31,7 +31,7 @@ import pandas as pd
 from benchmarks.one_thread import keep_to_one_thread
 from biogrip.arrays import Array
 from biogrip.files import write_text
-from biogrip.records.identifications import share_in_words
+from biogrip_study.records.identifications import share_in_words
 
 Rng = np.random.Generator
 Course = Callable[[Array], Array]

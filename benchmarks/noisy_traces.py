@@ -9,19 +9,19 @@ import yaml
 
 from biogrip.arrays import Array
 from biogrip.fit.experiment import Experiment
-from biogrip.fit.genetic import GeneticSettings
-from biogrip.fit.genome import Genome, make_genome
 from biogrip.fit.problem import TraceProblem
 from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import GRIPPER
-from biogrip.physics.misfit import Misfit, make_misfit
 from biogrip.physics.noise import add_noise, nuisance_basis, rms
 from biogrip.physics.protocol import Course, join_phases
 from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.response import step_response, superpose
 from biogrip.physics.sample_model import SampleModel
-from biogrip.study.study import Case, load_study
+from biogrip_study.config.study import Case, load_study
+from biogrip_study.methods.genetic import GeneticSettings
+from biogrip_study.methods.genome import Genome, make_genome
+from biogrip_study.methods.misfit import Misfit, make_misfit
 
 CONFIG = Path(__file__).parents[1] / "config" / "config.yaml"
 BATCH = 25
@@ -85,7 +85,7 @@ def noisy_trace(seed: int = 0) -> NoisyTrace:
     """Return the cell's trace with the noise of a seed."""
     steps, time_s, clean = _clean()
     trace_rad = add_noise(clean, case().noise, np.random.default_rng(seed))
-    model, genetic = case().sample.model, case().block.genetic_algorithm
+    model, genetic = case().sample.model, case().block.method("genetic")
     return NoisyTrace(
         case().gripper,
         model,
@@ -93,6 +93,6 @@ def noisy_trace(seed: int = 0) -> NoisyTrace:
         time_s,
         trace_rad,
         rms(trace_rad - clean),
-        make_genome(model, case().experiment.ranges),
+        make_genome([case().experiment.ranges[p.range_name] for p in model.parameters]),
         genetic,
     )

@@ -31,7 +31,7 @@ from biogrip.physics.models import MODELS
 from biogrip.physics.noise import nuisance_basis
 from biogrip.physics.protocol import Phase, hold, join_phases, ramp
 from biogrip.physics.residuals import Residuals, Trace
-from biogrip.records.identifications import share_in_words
+from biogrip_study.records.identifications import share_in_words
 from tests.helpers.laplace import IMPEDANCES
 
 _RESULTS = Path(__file__).parent / "results" / "without_model.csv"

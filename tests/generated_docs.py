@@ -22,13 +22,14 @@ from scipy.stats import chi2
 from biogrip.cli import main
 from biogrip.digits import plain as in_digits
 from biogrip.digits import with_unit
-from biogrip.fit.problem import identifier, silent
-from biogrip.page import answers
+from biogrip.fit.problem import silent
 from biogrip.physics.models import ALIASES, MAXWELL_MODELS
 from biogrip.physics.noise import add_noise, stream
 from biogrip.physics.simulation import simulated_response
-from biogrip.records.identifications import share_in_words
-from biogrip.records.rows import read_table
+from biogrip.records import read_table
+from biogrip_study.methods.registry import identifier
+from biogrip_study.page import answers
+from biogrip_study.records.identifications import share_in_words
 from tests.helpers.default import STUDY, study_of
 from tests.helpers.key_reference import file_schema, reference
 from tests.helpers.places import EXAMPLE, EXAMPLE_TRUTH, ROOT
@@ -273,7 +274,7 @@ def slow_branch() -> str:
     case = STUDY.case("liquid_drop_1")
     slow = study_of(f"cases: {{liquid_drop_1: {{fixed: {{c: {_SLOW}}}}}}}").case(case.name)
     time_s, seeds = case.times_s, range(case.seeds)
-    (target,) = simulated_response(case.gripper, case.network, case.torque, time_s, nonlinear=False)
+    (target,) = simulated_response(case.gripper, case.network, case.torque, time_s)
     rngs = [stream(STUDY.config.study_seed, case.name, seed, "noise") for seed in seeds]
     traces = [add_noise(target, case.noise, rng, time_s) for rng in rngs]
     identify = identifier("least_squares", case.block.least_squares)
@@ -334,10 +335,12 @@ def _quantities(*options: str) -> str:
 
 def folders() -> str:
     told = {
-        file.parent.name: str(ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))))
-        for file in sorted((ROOT / "src" / "biogrip").glob("*/__init__.py"))
+        file.parent.relative_to(ROOT / "src"): str(
+            ast.get_docstring(ast.parse(file.read_text("utf-8")))
+        )
+        for file in sorted((ROOT / "src").glob("*/*/__init__.py"))
     }
-    return _table({"folder of `src/biogrip/`": name, "has": has} for name, has in told.items())
+    return _table({"folder of `src/`": str(name), "has": has} for name, has in told.items())
 
 
 def command_help() -> str:

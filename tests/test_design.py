@@ -1,4 +1,3 @@
-import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -76,7 +75,7 @@ def test_the_search_knows_the_force_of_the_jaws() -> None:
         train = design.decode(unknowns, limits)
         torque = replace(one.case.experiment, phases=train.phases).torque
         network = one.case.experiment.searched.network(one.parameters[None])
-        grip = compute_grip(one.case.gripper, network, torque, nonlinear=False)
+        grip = compute_grip(one.case.gripper, network, torque)
         pressed.append(grip.lowest_N > 0)
         share = one.told(train)[1]
         assert (share > 0) == pressed[-1] or abs(share) < 0.01
@@ -146,38 +145,14 @@ def test_a_design_is_better_and_keeps_its_limits(
 
 def test_what_cannot_be_designed_is_said(tmp_path: Path, capsys: Any) -> None:
     config = tmp_path / "my.yaml"
-    for block, within, words in (
-        ("design: {stepps: 4}", "", "Did you mean 'steps'?"),
-        ("design: {duration_s: 0.1}", "", "my.yaml: design.duration_s: found 0.1 s, room for 1 "),
-        ("design: {duration_s: 1.0e+9}", "", "room for 10000000000 readings at 10 Hz; allowed are"),
-        ("measurement: {rate_Hz: 1.0e+4}", "", "room for 4000000 readings at 10000 Hz; allowed"),
-        ("measurement: {noise: {level: 0.1, reference: signal}}", "", "noise: allowed is white no"),
-        ("fixed: {c_p: 1.0e-3}", "kp=10", "found 'kp', allowed are k, k_p, c. Did you mean 'k_p'?"),
+    for block, words in (
+        ("design: {stepps: 4}", "Did you mean 'steps'?"),
+        ("design: {duration_s: 0.1}", "my.yaml: design.duration_s: found 0.1 s, room for 1 "),
+        ("design: {duration_s: 1.0e+9}", "room for 10000000000 readings at 10 Hz; allowed are"),
+        ("measurement: {rate_Hz: 1.0e+4}", "room for 4000000 readings at 10000 Hz; allowed"),
+        ("measurement: {noise: {level: 0.1, reference: signal}}", "noise: allowed is white no"),
     ):
         config.write_text(f"only: [endothelial_cell]\n{block}\n")
-        given = ["--within", within] if within else []
-        assert main(["design", str(config), *given]) == 1
+        assert main(["design", str(config)]) == 1
         assert words in capsys.readouterr().err
         assert [*tmp_path.iterdir()] == [config]
-
-
-def test_the_shortest_protocol_is_found_and_what_noise_a_better_one_takes(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(design, "_QUICK", 5)
-    monkeypatch.setattr(design, "_FEWER", 20)
-    output = designed(tmp_path, KELVIN, "--within", "k_s=6")
-    said = capsys.readouterr().out
-    (lasts_s,) = re.findall(r"[Dd]esigned is the shortest, (\S+) s at 10 Hz", said)
-    assert 1.0 < float(lasts_s) < 30.0
-    (case,) = study_of(output.read_text()).cases.values()
-    assert case.experiment.torque.end_s == pytest.approx(float(lasts_s), rel=0.06)
-    bound = next(line for line in said.splitlines() if "k_s: bound" in line).split()[-1]
-    assert 1.96 * float(bound) < 6.3
-    # The noise of a row is that at which its protocol does it: they are in proportion.
-    rows = [line.split() for line in said.splitlines()[2:] if len(line.split()) == 5]
-    products = [float(row[3]) * float(row[4]) for row in rows if row[3] != "none"]
-    assert products == pytest.approx([products[0]] * len(products), rel=0.01)
-    designed(tmp_path, KELVIN, "--within", "k_s=0.001")
-    said = "No protocol reaches 0.001 %; designed is the most precise"
-    assert said in capsys.readouterr().out

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from biogrip.cli import main
-from biogrip.command.settings import Asked, check_settings, is_table, read_table
+from biogrip.command.settings import Asked, check_settings
+from biogrip.command.sheet import is_table, read_table
 from biogrip.errors import BiogripError
 from tests.helpers.identified import identify
 from tests.helpers.places import EXAMPLE

@@ -21,10 +21,10 @@ from biogrip.command.options import Setting
 from biogrip.command.outputs import WRITTEN_BY, Outcome, table_of
 from biogrip.command.settings import Asked, case_of
 from biogrip.command.words import for_a_paper, in_columns, noise_in_words
+from biogrip.config.source import HOLD
 from biogrip.errors import BiogripError
 from biogrip.judging.doubts import REJECTION
 from biogrip.physics.models import CANDIDATES
-from biogrip.study.source import HOLD
 from tests.generated_docs import example
 from tests.helpers.identified import FEW, by_quantity, identified, identify, told, write_drop
 from tests.helpers.places import EXAMPLE, EXAMPLE_TRUTH, ROOT
@@ -197,7 +197,7 @@ REFUSED = {
     "identify a.csv b.csv --output x.json": "--output: only for one trace",
     "identify table.csv --output x.json": "--output: only for one trace",
     "identify table.csv --csv a.csv": "a.csv: is read; allowed is another file to write.",
-    "identify a.csv b.csv --config bad.yaml": "bad.yaml, line 1: seedz: unknown key",
+    "identify a.csv b.csv --config bad.yaml": "bad.yaml, line 1: protocl: unknown key",
 }
 
 
@@ -210,7 +210,7 @@ def test_what_cannot_be_used_is_named_once_and_at_once(
         shutil.copy(EXAMPLE, name)
     Path("table.csv").write_text("file,dish\na.csv,left\n")
     Path("theirs.html").write_text("<p>mine</p>")
-    Path("bad.yaml").write_text("seedz: 3")
+    Path("bad.yaml").write_text("protocl: 3")
     Path("link.csv").symlink_to("a.csv")
     Path("link.json").symlink_to("b.csv")
     os.mkfifo("pipe")

@@ -11,7 +11,8 @@ import pytest
 from biogrip.command import files as command
 from biogrip.command.options import Setting
 from biogrip.command.outputs import read_result, write_result
-from biogrip.command.settings import Asked, is_table, read_table
+from biogrip.command.settings import Asked
+from biogrip.command.sheet import is_table, read_table
 from biogrip.errors import BiogripError
 from biogrip.library import Sample, hold, set_up, simulate
 from tests.helpers.default import STUDY
@@ -70,7 +71,7 @@ def test_a_trace_may_stand_beside_a_table_that_does_not_name_it(here: Path) -> N
     write(here / "cells.tsv", HEADER, OTHER)
     status, printed, _ = identify("usual.csv", "cells.tsv", "--csv", "found.csv")
     assert status == 0
-    assumed = "the default study's gripper and the default study's protocol (200 s at 1.6e-09 N m, "
+    assumed = "the paper's gripper and the paper's protocol (200 s at 1.6e-09 N m, "
     assert f"\nusual.csv: Assumed: {assumed}200 s at 3.2e-10 N m); give" in printed
     assert "other.csv: Assumed" not in printed
     rows = Path("found.csv").read_text().splitlines()
@@ -161,8 +162,8 @@ def test_settings_that_cannot_be_used_are_said_at_once(here: Path) -> None:
     assert status == 1
     said = [
         "line 2, column 'measurement.noise_rad': measurement.noise_rad: found -1, allowed is",
-        "line 2, column 'sample.model': sample.model: found 'maxwel'. Did you mean 'maxwell'?",
         "line 2, column 'measurment.skip': measurment: unknown key. Did you mean 'measurement'",
+        "line 2, column 'sample.model': sample.model: found 'maxwel'. Did you mean 'maxwell'?",
         "line 3, column 'fixed.k_s': fixed.k_s: is no parameter of the sample, which has k_p",
     ]
     lines = [line.partition("cells.tsv, ")[2] for line in error.splitlines()]
@@ -239,7 +240,12 @@ def test_a_result_is_made_from_trace_config_and_options(tmp_path: Path) -> None:
     trace, config = tmp_path / "a.csv", tmp_path / "few.yaml"
     at = Setting("--at", ("identifiability", "at_s"), [10])
     made_from = set()
-    for value, keys, own in ((1, "", ()), (2, "", ()), (2, "a: 9", ()), (2, "a: 9", (at,))):
+    for value, keys, own in (
+        (1, "", ()),
+        (2, "", ()),
+        (2, "study_seed: 9", ()),
+        (2, "study_seed: 9", (at,)),
+    ):
         trace.write_text(f"time_s,rotation_rad\n0,{value}\n")
         config.write_text(keys)
         made_from.add(command._made_from(Asked(trace, config, own)))

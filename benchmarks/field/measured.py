@@ -22,14 +22,15 @@ import numpy as np
 from benchmarks.report import Row, Section, number
 from benchmarks.timing import Timed, clocked
 from biogrip.arrays import Array, BoolArray
+from biogrip.config.loading import read_configs
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.problem import Fit
 from biogrip.identify.prepare import prepare, ranges_of
 from biogrip.judging.diagnosis import diagnose
 from biogrip.judging.verdicts import DETERMINED
 from biogrip.library import Phase, Sample, hold, identify_sample, one_blas_thread, simulate
-from biogrip.study.study import load_study, read_configs
 from biogrip.traces.reader import Recording, read_recording
+from biogrip_study.config.study import load_study
 
 ROOT = Path(__file__).parents[2]
 CONFIGS = ("config/config.yaml", "config/measured.yaml")

@@ -1,4 +1,4 @@
-"""Identification of viscoelastic parameters of cells with a MEMS microgripper: a study.
+"""Identify the viscoelastic parameters of samples in recorded traces, and say what each determines.
 
 `biogrip.library` has the functions for notebooks, which can also be imported from here::
 

@@ -1,13 +1,11 @@
 """Identify the viscoelastic parameters of samples in recorded traces."""
 
 import argparse
-import math
 import os
 import re
 import signal
 import sys
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NoReturn
@@ -102,17 +100,9 @@ def _parser() -> argparse.ArgumentParser:
     parser = _Parser(prog="biogrip", description=__doc__)
     parser.add_argument("--version", action="version", version=f"biogrip {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    for add in (_add_identify, _add_study, _add_groups, _add_design):
+    for add in (_add_identify, _add_groups, _add_design):
         add(commands)
     return parser
-
-
-def _within(text: str) -> tuple[str | None, float]:
-    name, _, percent = text.rpartition("=")
-    with suppress(ValueError):
-        if 0 < float(percent) < math.inf:
-            return name or None, float(percent)
-    raise ValueError(f"found '{text}', allowed is a percentage, or as in k=10")
 
 
 def _read(reader: Callable[[str], Any]) -> Callable[[str], Any]:
@@ -141,7 +131,7 @@ class _Set(argparse.Action):
         namespace.settings = [*namespace.settings, Setting(str(option), path, value)]
 
 
-def _add_settings(parser: Any, *, outputs: bool = False) -> None:
+def _add_settings(parser: Any) -> None:
     parser.set_defaults(settings=[])
     parser.lists_models = True
     parser.add_argument(
@@ -166,7 +156,6 @@ def _add_settings(parser: Any, *, outputs: bool = False) -> None:
             of_key = {"dest": "model_selection.models", "nargs": 0, "const": []}
             text = "do not try other models, which takes long where none fits"
             group.add_argument("--no-compare", action=_Set, help=text, **of_key)
-        if title == "the sample" and outputs:
             group = parser.add_argument_group("output")
             _add_file(group, "--report", "PAGE", "HTML page with pictures")
             _add_file(group, "--csv", "TABLE", "CSV file, a row per trace", dest="table")
@@ -188,21 +177,11 @@ def _add_identify(commands: Any) -> None:
         "identify cells.tsv --config my_gripper.yaml --csv found.csv",
     )
     identify.cost = "A trace takes seconds, or longer where no model fits it (--no-compare)."
-    _add_settings(identify, outputs=True)
+    _add_settings(identify)
 
 
 def _add_file(parser: Any, name: str, metavar: str, text: str, **more: Any) -> None:
     parser.add_argument(name, type=Path, metavar=metavar, help=text, **more)
-
-
-def _add_study(commands: Any) -> None:
-    text = "write the config of a study of recorded traces, from the options of identify"
-    study = commands.add_parser("study", help=text, description=text)
-    study.set_defaults(command="biogrip.command.study:write_study")
-    study.examples = ("study cell.csv --config my_gripper.yaml --model liquid_drop",)
-    _add_settings(study)
-    text = "new folder for the study [TRACE_study]"
-    _add_file(study, "--output", "FOLDER", text, dest="folder")
 
 
 def _add_groups(commands: Any) -> None:
@@ -227,11 +206,9 @@ def _add_design(commands: Any) -> None:
     text = "search a protocol of steps that determines the samples of a config better"
     design = commands.add_parser("design", help=text, description=text)
     design.set_defaults(command="biogrip.design:design")
-    design.examples = ("design my.yaml", "design my.yaml --within k=10")
+    design.examples = ("design my.yaml", "design my.yaml --output designed.yaml")
     design.cost = "The search takes less than a minute."
-    text = "YAML file with your samples, laid over the default study"
+    text = "YAML file with your samples"
     design.add_argument("config", type=Path, help=text)
     text = "config of the designed study, YAML [CONFIG_designed.yaml]"
     _add_file(design, "--output", "OUTPUT", text)
-    text = "the shortest protocol whose 95 %% limits of a parameter, or of all, are within PERCENT"
-    design.add_argument("--within", type=_read(_within), metavar="[NAME=]PERCENT", help=text)

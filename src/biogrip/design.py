@@ -6,9 +6,11 @@ larger or smaller. SciPy's differential evolution searches levels and durations 
 worst Cramér-Rao bound.
 """
 
+import sys
 from collections.abc import Iterator, Sequence
 from copy import deepcopy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
@@ -18,17 +20,19 @@ import yaml
 from biogrip import __version__
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.command.outputs import WRITTEN_BY, check_outputs
+from biogrip.config.case import SampleCase
+from biogrip.config.design_blocks import SHARED, DesignBlock, DesignConfig
+from biogrip.config.loading import load, read_config_of, read_configs, trace_defaults
+from biogrip.config.source import overlaid, read_config, read_source
+from biogrip.config.trace_blocks import SampleBlocks
 from biogrip.digits import significant, with_unit
-from biogrip.errors import BiogripError, nearest
+from biogrip.errors import BiogripError
 from biogrip.files import write_text
 from biogrip.physics.modes import linear_responses
 from biogrip.physics.noise import standard_deviation, without
 from biogrip.physics.protocol import Phase, hold, join_phases, largest_load, sample_times
 from biogrip.physics.response import linear_jaw_force
 from biogrip.physics.simulation import compute_grip, simulated_response
-from biogrip.study.config import DesignBlock
-from biogrip.study.source import default_config, overlaid, read_config
-from biogrip.study.study import Case, load_study, read_configs
 from biogrip.terminal import aligned, visible_lines
 
 GENERATIONS = 500
@@ -43,9 +47,6 @@ _SEED, _POPSIZE, _TRIED = 1, 5, 512
 _FEWEST, _KEPT = 5, 0.01
 _MOST = 100_000  # readings of a train
 _FINE = 10_000  # levels in the largest
-# Of a table of costs: generations and steps of each search, durations, and halvings of what is
-# left to the shortest; of a normal distribution what holds 95 %.
-_QUICK, _FEWER, _FEW_STEPS, _HALVED, _BISECTIONS, _NORMAL = 25, 100, 4, 6, 3, 1.96
 # Score of a train under which the jaws would have to pull: above all logarithms of bounds.
 _PULLS = 10.0
 
@@ -93,7 +94,7 @@ class Train:
 class Specimen:
     """The sample of a case, and how it answers a unit step."""
 
-    case: Case
+    case: SampleCase
     parameters: Array
     """Values of the searched parameters, (n_parameters,)."""
     noise: float
@@ -129,17 +130,17 @@ def relative_bounds(slopes: Array, noise: float) -> Array:
     A parameter that is not told to a factor of e with all others known is taken as known for the
     others, as in `biogrip.judging.likelihood`, and has `NO_BOUND`.
     """
-    sizes, found = np.linalg.norm(slopes, axis=1) / noise, np.full(len(slopes), NO_BOUND)
+    sizes, bounds = np.linalg.norm(slopes, axis=1) / noise, np.full(len(slopes), NO_BOUND)
     informed = sizes >= 1
     rows = slopes[informed] / (noise * sizes[informed, None])
     # Parameters that stand for one another leave a matrix that can hardly be inverted.
     inverse = np.linalg.inv(rows @ rows.T + 1e-12 * np.eye(len(rows)))
-    found[informed] = np.sqrt(np.diag(inverse)) / sizes[informed]
-    return np.minimum(found, NO_BOUND)
+    bounds[informed] = np.sqrt(np.diag(inverse)) / sizes[informed]
+    return np.minimum(bounds, NO_BOUND)
 
 
 @dataclass(frozen=True, eq=False)
-class Experiment:
+class RatedProtocol:
     """Protocol and readings, with what they tell of a sample."""
 
     phases: tuple[Phase, ...]
@@ -150,118 +151,55 @@ class Experiment:
     """Least force of the jaws, if there are jaws; negative if they have to pull."""
 
 
-def design(
-    config: Path, output: Path | None = None, within: tuple[str | None, float] | None = None
-) -> None:
+def design(config: Path, output: Path | None = None) -> None:
     """Search for a train of steps, print what it tells, and write a config that runs it.
 
-    The config, a YAML file, is laid over the default study. By default the output is beside it,
-    with `_designed` in its name; a file that biogrip did not write is not replaced. If a parameter,
-    or None for all, is to be known within some percent, the train is the shortest that does it.
-    A `BiogripError` says what cannot be used, or that no train tells anything.
+    The config, a YAML file, is laid over samples of installed studies, and over what every trace
+    takes. By default the output is beside it, with `_designed` in its name; a file that biogrip did
+    not write is not replaced. A `BiogripError` says what cannot be used, or that no train tells
+    anything.
     """
     output = output or config.with_stem(f"{config.stem}_designed")
     check_outputs([output], [config])
-    files = [default_config(), config]
-    study = load_study(read_configs(files), files)
-    cases, block = list(study.cases.values()), study.config.design
-    costs: list[str] = []
-    rate_Hz = None
-    if within is not None:
-        name, percent = within
-        names = dict.fromkeys(it for case in cases for it in case.experiment.searched.names)
-        if name and name not in names:
-            allowed = f"allowed are {', '.join(names)}.{nearest(name, names)}"
-            raise BiogripError(f"--within: found '{name}', {allowed}")
-        block = replace(block, parameters=(name,)) if name else block
-        cost, costs = cheapest(cases, block, percent)
-        block, rate_Hz = replace(block, duration_s=cost.duration_s), cost.rate_Hz
+    cases, block = read_samples(config)
     try:
-        limits, specimens = set_up(cases, block, rate_Hz)
+        limits, specimens = set_up(cases, block)
     except BiogripError as error:
         raise BiogripError(f"{config}: {error}") from error
-    train, reached = search(specimens, limits, GENERATIONS if within is None else _FEWER)
+    train, reached = search(specimens, limits)
     before = [rated(one, one.case.phases, one.case.block.measurement.rate_Hz) for one in specimens]
     after = [rated(one, train.phases, limits.rate_Hz) for one in specimens]
     write_text(output, as_config(read_config(config), specimens, after, limits.rate_Hz))
     then = f"snakemake -j2 --configfile {output} simulates and fits it"
-    said = [*costs, *_said(specimens, before, after, reached), f"Written to {output}; {then}."]
+    said = [*_said(specimens, before, after, reached), f"Written to {output}; {then}."]
     print(visible_lines("\n".join(said)))
 
 
-@dataclass(frozen=True)
-class Cost:
-    """What a protocol costs, and how well the worst parameter is known by it."""
-
-    duration_s: float
-    rate_Hz: float
-    percent: float
-    """Half of the 95 % interval of the worst parameter; infinite if nothing is told."""
-
-
-def cheapest(cases: Sequence[Case], block: DesignBlock, percent: float) -> tuple[Cost, list[str]]:
-    """Return the shortest protocol by which all that is asked for is known within some percent.
-
-    It is one at the config's rate, or else one with as many readings; if there is none, the most
-    precise. Lines have a table of what others cost.
-    """
-    limits, specimens = set_up(cases, block)
-    longest_s = limits.intervals / limits.rate_Hz
-
-    def cost(duration_s: float, rate_Hz: float) -> Cost:
-        own = replace(block, duration_s=duration_s, steps=min(block.steps, _FEW_STEPS))
-        try:
-            limits, specimens = set_up(cases, own, rate_Hz)
-            train, reached = search(specimens, limits, _QUICK, _TRIED // 8)
-        except BiogripError:
-            return Cost(duration_s, rate_Hz, np.inf)
-        bounds = [one.told(train)[0][it] for one, it in zip(specimens, reached, strict=True)]
-        return Cost(duration_s, rate_Hz, 100 * _NORMAL * float(np.concatenate(bounds).max()))
-
-    def rate_Hz(duration_s: float, *, keeps: bool) -> float:
-        return limits.rate_Hz if keeps else limits.intervals / duration_s
-
-    own_rate, own_count = (
-        [cost(longest_s / 2**n, rate_Hz(longest_s / 2**n, keeps=keeps)) for n in range(_HALVED)]
-        for keeps in (True, False)
-    )
-    found = [*own_rate, *own_count[1:]]
-    good = [each for each in own_rate if each.percent <= percent]
-    keeps, good = bool(good), good or [each for each in found if each.percent <= percent]
-    best = min(good or found, key=lambda each: each.duration_s if good else each.percent)
-    short_s, long_s = best.duration_s / 2, best.duration_s
-    for _ in range(_BISECTIONS if good else 0):
-        duration_s = float(np.sqrt(short_s * long_s))
-        more = cost(duration_s, rate_Hz(duration_s, keeps=keeps))
-        if more.percent <= percent:
-            best, long_s = more, duration_s
-        else:
-            short_s = duration_s
-    noise = {one.noise for one in specimens}
-    rows = [
-        (
-            *(f"{each.duration_s:.3g}", f"{each.rate_Hz:.4g}"),
-            f"{each.duration_s * each.rate_Hz + 1:.0f}",
-            f"{each.percent:.3g}" if each.percent < 100 * NO_BOUND else "none",
-            f"{percent / each.percent * min(noise):.3g}" if each.percent < np.inf else "",
-        )
-        for each in sorted({*found, best}, key=lambda it: (it.duration_s, it.rate_Hz))
-    ]
-    read = specimens[0].case.instrument.read
-    header = ["duration (s)", "rate (Hz)", "readings", "95 % limits (± %)"]
-    header += [with_unit(f"noise for {percent:g} %", read.unit)]
-    words = "Designed is the shortest"
-    if not good:
-        words = f"No protocol reaches {percent:g} %; designed is the most precise"
-    return best, [
-        aligned(rows, header),
-        f"{words}, {best.duration_s:.3g} s at {best.rate_Hz:.4g} Hz.",
-    ]
+def read_samples(config: Path) -> tuple[list[SampleCase], DesignBlock]:
+    """Read the samples of a config, and the limits of the design; see `design` for errors."""
+    # Studies that are installed offer their samples, by the files of their configs.
+    files = [offer.load()() for offer in entry_points(group="biogrip.samples")]
+    cases = {"cases": read_configs(files).get("cases", {})}
+    merged = overlaid(read_configs([trace_defaults()]), cases)
+    given, notes = read_config_of(DesignConfig, [config])
+    for note in notes:
+        print(visible_lines(note), file=sys.stderr)
+    merged = overlaid(merged, given)
+    if isinstance(cases := merged.get("cases"), dict):
+        merged["cases"] = {name: _of_sample(case) for name, case in cases.items()}
+    sources = [*map(read_source, (trace_defaults(), *files, config))]
+    loaded = load(DesignConfig, merged, sources, SHARED)
+    chosen = loaded.only or loaded.cases
+    return [SampleCase(name, loaded.cases[name], loaded) for name in chosen], loaded.design
 
 
-def set_up(
-    cases: Sequence[Case], block: DesignBlock, rate_Hz: float | None = None
-) -> tuple[Limits, list[Specimen]]:
+def _of_sample(case: Any) -> Any:
+    """Return the keys of a case that are not of a study."""
+    known = {block.name for block in fields(SampleBlocks)}
+    return {key: case[key] for key in case if key in known} if isinstance(case, dict) else case
+
+
+def set_up(cases: Sequence[SampleCase], block: DesignBlock) -> tuple[Limits, list[Specimen]]:
     """Return the limits of a block, by default those of all protocols, and the samples of cases.
 
     A `BiogripError` says which case cannot be judged, and why; or that there is no room for a step.
@@ -272,7 +210,7 @@ def set_up(
     largest = min((largest_load(case.phases) for case in cases), key=abs)
     if block.largest is not None:
         largest = float(np.copysign(block.largest, largest))
-    rate_Hz = rate_Hz or min(case.block.measurement.rate_Hz for case in cases)
+    rate_Hz = min(case.block.measurement.rate_Hz for case in cases)
     duration_s = block.duration_s or min(case.experiment.torque.end_s for case in cases)
     intervals = int(duration_s * rate_Hz * (1 + 1e-12))
     if not _FEWEST <= intervals <= _MOST:
@@ -284,7 +222,7 @@ def set_up(
     return limits, [_specimen(case, block, limits) for case in cases]
 
 
-def _problem(case: Case, first: Case) -> str | None:
+def _problem(case: SampleCase, first: SampleCase) -> str | None:
     """Return what of a case cannot be judged, and what is allowed."""
     controlled = case.instrument.controlled
     if case.recorded:
@@ -298,16 +236,14 @@ def _problem(case: Case, first: Case) -> str | None:
     of_signal = case.noise.level_rad is None and case.noise.reference == "signal"
     if case.noise.absent or not case.noise.white or of_signal:
         return "measurement.noise: allowed is white noise, of a share of the peak or a level_rad."
-    if case.nonlinear_target:
-        return "models.target: found nonlinear, allowed is linear."
     return None
 
 
-def _specimen(case: Case, block: DesignBlock, limits: Limits) -> Specimen:
+def _specimen(case: SampleCase, block: DesignBlock, limits: Limits) -> Specimen:
     problem, model, network = case.experiment, case.experiment.searched, case.network
     required = np.array([name in (block.parameters or model.names) for name in model.names])
     # The noise of an instrument: that of its own sample under its own protocol.
-    read = simulated_response(case.gripper, network, problem.torque, case.times_s, nonlinear=False)
+    read = simulated_response(case.gripper, network, problem.torque, case.times_s)
     noise = float(standard_deviation(read[0], case.noise)[0])
     elapsed_s = limits.elapsed_s
     step = join_phases((hold(elapsed_s[-1], 1.0),), deforms=case.instrument.deforms)
@@ -321,10 +257,7 @@ def _specimen(case: Case, block: DesignBlock, limits: Limits) -> Specimen:
 
 
 def search(
-    specimens: Sequence[Specimen],
-    limits: Limits,
-    generations: int = GENERATIONS,
-    trials: int = _TRIED,
+    specimens: Sequence[Specimen], limits: Limits, generations: int = GENERATIONS
 ) -> tuple[Train, list[BoolArray]]:
     """Search for the train with the lowest worst bound of all parameters within reach.
 
@@ -336,7 +269,7 @@ def search(
     from scipy.optimize import differential_evolution
 
     unknowns, rng = 2 * limits.steps, np.random.default_rng(_SEED)
-    tried = [decode(each, limits) for each in rng.random((trials, unknowns))]
+    tried = [decode(point, limits) for point in rng.random((_TRIED, unknowns))]
     reached = [
         np.any([one.told(train)[0] < NO_BOUND for train in tried], axis=0) & one.required
         for one in specimens
@@ -345,15 +278,15 @@ def search(
         text = "no protocol determines a parameter asked for; allowed are less noise, a higher "
         raise BiogripError(f"design: {text}`largest`, a longer duration_s or a higher rate_Hz.")
 
-    def score(each: Array) -> float:
-        bounds, least = zip(*(one.told(decode(each, limits)) for one in specimens), strict=True)
+    def score(point: Array) -> float:
+        bounds, least = zip(*(one.told(decode(point, limits)) for one in specimens), strict=True)
         if min(least) < _KEPT:
             return _PULLS - min(least)
         logs = np.log(np.concatenate(bounds)[np.concatenate(reached)])
         # The mean decides among equals, and last bits do not.
         return float(np.float32(logs.max() + 0.01 * logs.mean()))
 
-    found = differential_evolution(
+    result = differential_evolution(
         score,
         [(0.0, 1.0)] * unknowns,
         popsize=_POPSIZE,
@@ -362,7 +295,7 @@ def search(
         rng=rng,
         polish=False,
     )
-    return decode(found.x, limits), reached
+    return decode(result.x, limits), reached
 
 
 def decode(unknowns: Array, limits: Limits) -> Train:
@@ -379,7 +312,7 @@ def decode(unknowns: Array, limits: Limits) -> Train:
     return Train(limits.largest * np.ceil(_FINE * heights) / _FINE, starts, limits)
 
 
-def rated(specimen: Specimen, phases: tuple[Phase, ...], rate_Hz: float) -> Experiment:
+def rated(specimen: Specimen, phases: tuple[Phase, ...], rate_Hz: float) -> RatedProtocol:
     """Compute what an experiment tells of a sample.
 
     If it turns the arms further than the comb drives can, it is a `BiogripError`.
@@ -394,41 +327,41 @@ def rated(specimen: Specimen, phases: tuple[Phase, ...], rate_Hz: float) -> Expe
     slopes = without(problem.nuisance(times_s), slopes)
     bounds = relative_bounds(slopes, specimen.noise)
     if not case.instrument.has_jaws:
-        return Experiment(phases, times_s, bounds, None)
+        return RatedProtocol(phases, times_s, bounds, None)
     if read.max() > case.stroke:
         text = f"found a torque that turns the arms by {1e3 * read.max():.4g} mrad, allowed is "
         text += f"what the stroke leaves, {1e3 * case.stroke:.4g} mrad: a lower `largest`."
         raise BiogripError(f"design: {case.name}: {text}")
     network = model.network(specimen.parameters[None])
-    grip = compute_grip(case.gripper, network, problem.torque, nonlinear=False)
-    return Experiment(phases, times_s, bounds, grip.lowest_N)
+    grip = compute_grip(case.gripper, network, problem.torque)
+    return RatedProtocol(phases, times_s, bounds, grip.lowest_N)
 
 
 def as_config(
     given: dict[str, Any],
     specimens: Sequence[Specimen],
-    after: Sequence[Experiment],
+    after: Sequence[RatedProtocol],
     rate_Hz: float,
 ) -> str:
     """Return a config, as YAML, with an experiment as that of its cases."""
-    found = deepcopy(given)
-    cases = found.setdefault("cases", {})
+    config = deepcopy(given)
+    cases = config.setdefault("cases", {})
     for one, experiment in zip(specimens, after, strict=True):
         column = one.case.instrument.controlled.column
         phases = [
             {"duration_s": phase.duration_s, column: phase.level} for phase in experiment.phases
         ]
         measured = {"noise": {"level_rad": one.noise}, "rate_Hz": rate_Hz}
-        own = {"protocol": {"phases": phases}, "measurement": measured}
-        cases[one.case.name] = overlaid(cases.get(one.case.name) or {}, own)
-    text = yaml.safe_dump(found, sort_keys=False, default_flow_style=None, width=100)
+        designed = {"protocol": {"phases": phases}, "measurement": measured}
+        cases[one.case.name] = overlaid(cases.get(one.case.name) or {}, designed)
+    text = yaml.safe_dump(config, sort_keys=False, default_flow_style=None, width=100)
     return f"# {WRITTEN_BY} {__version__}: a protocol by `biogrip design`.\n{text}"
 
 
 def _said(
     specimens: Sequence[Specimen],
-    before: Sequence[Experiment],
-    after: Sequence[Experiment],
+    before: Sequence[RatedProtocol],
+    after: Sequence[RatedProtocol],
     reached: Sequence[BoolArray],
 ) -> Iterator[str]:
     """Yield lines: a table, and what it takes for granted."""
@@ -438,22 +371,22 @@ def _said(
         name, instrument = one.case.name, one.case.instrument
         controlled, read = instrument.controlled, instrument.read
         for index, parameter in enumerate(one.case.experiment.searched.names):
-            bounds = (each.bounds[index] for each in both)
-            percents = (f"{100 * it:.3g}" if it < NO_BOUND else "none" for it in bounds)
+            bounds = (rating.bounds[index] for rating in both)
+            percents = (f"{100 * bound:.3g}" if bound < NO_BOUND else "none" for bound in bounds)
             rows.append((name, f"{parameter}: bound (%)", *percents))
             if one.required[index] and not within[index]:
                 notes.append(f"No protocol that was tried determines {parameter} of {name}.")
         values = {
             with_unit(f"noise of the {read.name}", read.unit): [one.noise, one.noise],
             with_unit(f"largest {controlled.name}", controlled.unit): [
-                largest_load(each.phases) for each in both
+                largest_load(rating.phases) for rating in both
             ],
-            "highest rate (Hz)": [1 / np.diff(each.times_s).min() for each in both],
-            "readings": [len(each.times_s) for each in both],
+            "highest rate (Hz)": [1 / np.diff(rating.times_s).min() for rating in both],
+            "readings": [len(rating.times_s) for rating in both],
         }
         if instrument.has_jaws:
-            values["least force of the jaws (N)"] = [each.force_N for each in both]
-        rows += [(name, what, *(f"{it:.4g}" for it in pair)) for what, pair in values.items()]
+            values["least force of the jaws (N)"] = [rating.force_N for rating in both]
+        rows += [(name, what, *(f"{value:.4g}" for value in pair)) for what, pair in values.items()]
     yield aligned(rows, ("sample", "", "config's protocol", "designed"))
     yield from notes
     yield (

@@ -60,11 +60,14 @@ def digest_of(file: Path) -> str:
 
 
 @cache
-def software() -> dict[str, str]:
-    """Return versions of what computes results, and a digest of our source."""
-    folder = Path(__file__).parent
-    files = sorted(it for it in folder.rglob("*") if it.suffix in (".py", ".j2", ".css"))
-    source = "".join(f"{file.relative_to(folder)} {digest_of(file)}\n" for file in files)
+def software(*others: Path) -> dict[str, str]:
+    """Return versions of what computes results, and a digest of the source in our folders."""
+    source = "".join(
+        f"{file.relative_to(folder)} {digest_of(file)}\n"
+        for folder in (Path(__file__).parent, *others)
+        for file in sorted(folder.rglob("*"))
+        if file.suffix in (".py", ".yaml", ".j2", ".css", ".js")
+    )
     versions = {name: version(name) for name in ("numpy", "scipy")}
     return {
         "biogrip": __version__,

@@ -36,7 +36,7 @@ from biogrip.judging.verdicts import (
     FIT_REJECTED,
     NOT_DETERMINED,
 )
-from biogrip.records.rows import read_rows, write_rows
+from biogrip.records import read_rows, write_rows
 from biogrip.terminal import aligned, visible, visible_lines
 from biogrip.traces.columns import trace_file_problem
 

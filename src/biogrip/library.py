@@ -19,11 +19,13 @@ from biogrip.command.options import Setting
 from biogrip.command.outputs import Outcome, table_of
 from biogrip.command.settings import MODEL, Asked, read_trace
 from biogrip.command.words import in_words
+from biogrip.config.loading import default_ranges
+from biogrip.config.source import HOLD
 from biogrip.errors import BiogripError
 from biogrip.fit.experiment import Experiment
-from biogrip.fit.genome import GeneRange
 from biogrip.fit.least_squares import identify_many
 from biogrip.fit.problem import Fit, silent
+from biogrip.fit.search_range import GeneRange
 from biogrip.identify.identify import identify
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.physics.gripper import NO_ARMS, Arm, Gripper
@@ -32,8 +34,6 @@ from biogrip.physics.models import Sample
 from biogrip.physics.noise import Noise, add_noise
 from biogrip.physics.protocol import Phase, hold
 from biogrip.physics.simulation import simulated_response
-from biogrip.study.source import HOLD
-from biogrip.study.study import default_ranges
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -280,7 +280,7 @@ def set_up(
     sample
         Constitutive model of the sample.
     ranges
-        Search ranges by name; by default those of the default study.
+        Search ranges by name; by default those of every trace.
     fixed
         Fixed parameters by name, SI units.
     """
@@ -318,7 +318,7 @@ def simulate(
     """
     network, torque = experiment.model.sample(parameters), experiment.torque
     times = as_column(time_s, "time_s")
-    return simulated_response(experiment.gripper, network, torque, times, nonlinear=False)[0]
+    return simulated_response(experiment.gripper, network, torque, times)[0]
 
 
 @one_blas_thread

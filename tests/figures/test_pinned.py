@@ -11,9 +11,9 @@ import pytest
 from PIL import Image
 from scipy.spatial import KDTree
 
-from biogrip.figures.overview import draw_robustness
 from biogrip.figures.style import save_png, styled
-from biogrip.tables.sweeps import POINTS
+from biogrip_study.figures.overview import draw_robustness
+from biogrip_study.tables.sweeps import POINTS
 from tests.helpers.default import study_of
 
 PINNED = Path(__file__).with_name("pinned")

@@ -7,16 +7,18 @@ import pytest
 from matplotlib.patches import Rectangle
 
 from biogrip.figures import style
-from biogrip.figures.course import draw_convergence, draw_scatter
-from biogrip.figures.fit import Fit, draw_fit, draw_fits, scale_of
+from biogrip.figures.fit import Fit, draw_fit, scale_of
 from biogrip.figures.likelihood import draw_profile
 from biogrip.figures.style import figure, save, styled
-from biogrip.fit.problem import METHODS
 from biogrip.physics.instruments import MODULUS
 from biogrip.physics.models import MODELS
-from biogrip.records.rows import write_arrays, write_object
-from biogrip.records.traces import Measurements, write_measurements
-from biogrip.stages import targets
+from biogrip.records import write_object
+from biogrip_study.figures.case_fit import draw_fits
+from biogrip_study.figures.course import draw_convergence, draw_scatter
+from biogrip_study.methods.registry import METHODS
+from biogrip_study.records.rows import write_arrays
+from biogrip_study.records.traces import Measurements, write_measurements
+from biogrip_study.stages import targets
 from tests.helpers.default import STUDY, study_of
 from tests.helpers.problems import rotation
 from workflow.paper.gripper import draw_torque

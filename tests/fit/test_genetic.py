@@ -8,19 +8,20 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array, IntArray
-from biogrip.fit import genetic, genetic_refined
-from biogrip.fit.genetic import GeneticSettings, select
-from biogrip.fit.genome import (
-    GeneRange,
+from biogrip.fit.problem import Fit, History, TraceProblem
+from biogrip.fit.search_range import GeneRange
+from biogrip.physics.models import MODELS, Sample
+from biogrip.physics.sample_model import with_fixed
+from biogrip_study.methods import genetic, genetic_refined
+from biogrip_study.methods.genetic import GeneticSettings, select
+from biogrip_study.methods.genome import (
     Genome,
+    encodable_values,
     lowest_encodable,
     make_genome,
     nearest_encodable,
 )
-from biogrip.fit.problem import Fit, History, TraceProblem
-from biogrip.physics.misfit import make_misfit
-from biogrip.physics.models import MODELS, Sample
-from biogrip.physics.sample_model import with_fixed
+from biogrip_study.methods.misfit import make_misfit
 from tests.helpers.problems import clean, pose_noisy
 
 SMALL = GeneticSettings(60, 30, "pairs", "once", 3, 0.5, 1, 4, 6, 25)
@@ -48,14 +49,17 @@ MODELS_SEARCHED = {
 POPULATIONS = [*READINGS, *MODELS_SEARCHED]
 STIFFNESS, DAMPING = GeneRange((-3, 8), (1, 9)), GeneRange((-4, 5), (1, 9))
 RANGES = {"k": STIFFNESS, "k_p": STIFFNESS, "c": DAMPING, "c_p": DAMPING}
-GENOME = make_genome(MAXWELL, RANGES)
+GENOME = make_genome([RANGES[p.range_name] for p in MAXWELL.parameters])
 
 
 @pytest.mark.parametrize("digits", [2, 6])
 def test_the_best_are_selected_and_the_lowest_genes_of_equals(digits: int) -> None:
     """With six digits, chromosomes need two numbers to be told apart."""
     ranges = {name: GeneRange((-16, 18), (0, 9), digits) for name in ("k", "k_p", "c", "c_p")}
-    genome, rng = make_genome(MAXWELL, ranges), np.random.default_rng(8)
+    genome, rng = (
+        make_genome([ranges[p.range_name] for p in MAXWELL.parameters]),
+        np.random.default_rng(8),
+    )
     chromosomes = genome.draw(3 * 500, rng).reshape(3, 500, -1)
     chromosomes[:, 1::3, :-2] = chromosomes[:, :1, :-2]
     ranking = rng.integers(0, 40, size=(3, 500)).astype(np.float32)
@@ -76,7 +80,7 @@ def decoded(genome: Genome, chromosomes: IntArray) -> Array:
 
 def gene_by_gene(posed: TraceProblem, settings: GeneticSettings, rng: np.random.Generator) -> Fit:
     """One population by itself, in single precision; of equals the lowest genes are first."""
-    misfit, genome = make_misfit(posed.residuals), posed.genome
+    misfit, genome = make_misfit(posed.residuals), make_genome(posed.ranges)
 
     def ranked(everyone: IntArray) -> tuple[IntArray, Array]:
         ranking = misfit(decoded(genome, everyone)).astype(np.float32)
@@ -202,7 +206,7 @@ def test_genes_are_drawn_uniformly_from_their_whole_range() -> None:
 @pytest.mark.parametrize("digit", [(1, 9), (0, 9), (3, 5)])
 def test_any_number_of_digits_is_decoded_as_a_decimal(digits: int, digit: tuple[int, int]) -> None:
     ranges = {**RANGES, "k": GeneRange((-16, 16), digit, digits)}
-    genome = make_genome(MAXWELL, ranges)
+    genome = make_genome([ranges[p.range_name] for p in MAXWELL.parameters])
     assert genome.genes == 9 + 1 + digits
     chromosomes = genome.draw(300, np.random.default_rng(digits))
     assert np.all(chromosomes[:, 1] > 0)
@@ -225,7 +229,9 @@ def test_zeros_in_front_reach_below_the_smallest_number_without() -> None:
     """Written out: 0.01 to 0.99, and 0.1 to 9.9 in steps of 0.1, each number once and ascending."""
     genes = GeneRange((0, 1), (0, 9), first_digit=0)
     hundredths = {*range(1, 100), *(10 * tenth for tenth in range(1, 100))}
-    np.testing.assert_allclose(genes.values, np.array(sorted(hundredths)) / 100, rtol=1e-15)
+    np.testing.assert_allclose(
+        encodable_values(genes), np.array(sorted(hundredths)) / 100, rtol=1e-15
+    )
     assert (genes.low, genes.high, nearest_encodable(0.056, genes)) == (0.01, 9.9, 0.06)
     # Chromosomes of zeros alone are zero.
     assert genes.least == (0, 0, 0)
@@ -243,7 +249,7 @@ def test_no_encodable_point_is_lower_where_the_optimum_is_not_encodable(digit: i
     def beyond(parameters: Array) -> Array:
         return np.log(1e5 / parameters).sum(axis=1)
 
-    every = np.array(list(product(*(genes.values for genes in ranges))))
+    every = np.array(list(product(*(encodable_values(genes) for genes in ranges))))
     for each in (valley, beyond):
         found = lowest_encodable(each, ranges, np.array([[33.73, 0.2843]]))
         assert found == each(every).min() > 1 + 1e-6

@@ -8,16 +8,17 @@ import pytest
 
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.fit import least_squares, levenberg_marquardt
-from biogrip.fit.genetic import GeneticSettings
 from biogrip.fit.least_squares import FINE, PRIOR_WIDTH, ROUGH, LocalFits
 from biogrip.fit.levenberg_marquardt import Minima, Normal, minimize
-from biogrip.fit.problem import METHODS, TraceProblem, identifier, silent
+from biogrip.fit.problem import TraceProblem, silent
 from biogrip.judging.constrained_fits import ConstrainedFits
 from biogrip.judging.quantities import parameters_and_sum
-from biogrip.physics import misfit
 from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.residuals import Residuals
 from biogrip.physics.sample_model import SampleModel, with_fixed
+from biogrip_study.methods import misfit
+from biogrip_study.methods.genetic import GeneticSettings
+from biogrip_study.methods.registry import METHODS, identifier
 from tests.helpers.default import STUDY, seen, study_of
 from tests.helpers.problems import (
     MODEL,

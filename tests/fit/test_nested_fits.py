@@ -185,7 +185,7 @@ def test_a_trace_that_is_posed_for_another_model_is_as_if_posed_alone(
     points = np.random.default_rng(4).uniform(alone.low, alone.high, (40, len(alone.low)))
     for one, other in (
         (ours.low, alone.low),
-        (ours.genome.low, alone.genome.low),
+        (ours.high, alone.high),
         *zip(ours.residuals(points[0]), alone.residuals(points[0]), strict=True),
         (each.residuals.misfit(np.exp(points)) for each in (ours, alone)),
     ):

@@ -28,7 +28,7 @@ ARM, HINGE = POSED.gripper.left, "stiffness_Nm_per_rad"
 
 def simulated(gripper: Gripper, x: Array) -> Array:
     network = POSED.searched.network(np.exp(x))
-    return simulated_response(gripper, network, POSED.torque, TIMES, nonlinear=False)[0]
+    return simulated_response(gripper, network, POSED.torque, TIMES)[0]
 
 
 CLEAN = simulated(POSED.gripper, TRUTH)

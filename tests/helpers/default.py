@@ -5,15 +5,15 @@ from typing import Any
 
 import yaml
 
-from biogrip.study.source import overlaid, read_config
-from biogrip.study.study import Study, load_study
-from tests.helpers.places import CONFIG
+from biogrip.config.loading import read_configs
+from biogrip.config.source import overlaid
+from biogrip_study.config.study import DEFAULTS, Study, load_study
 
 
 def study_of(overlay: str = "") -> Study:
     """The default study under a config that is given as YAML."""
     over: dict[str, Any] = yaml.safe_load(overlay) or {}
-    return load_study(overlaid(read_config(CONFIG), over), [CONFIG])
+    return load_study(overlaid(read_configs(DEFAULTS), over), DEFAULTS)
 
 
 def seen(**values: object) -> Any:

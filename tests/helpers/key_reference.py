@@ -6,14 +6,14 @@ from functools import cache
 from typing import Any
 
 import pandas as pd
-import yaml
 from pydantic import TypeAdapter
 
+from biogrip.config.loading import read_configs
+from biogrip.config.messages import Schema, bound, tidy
 from biogrip.keys import Block
-from biogrip.study.case_blocks import OVERRIDABLE
-from biogrip.study.config import StudyConfig
-from biogrip.study.messages import Schema, bound, tidy
-from tests.helpers.places import CONFIG
+from biogrip_study.config.case_blocks import OVERRIDABLE
+from biogrip_study.config.study import DEFAULTS
+from biogrip_study.config.study_blocks import StudyConfig
 
 _MOST_LISTED = 6
 _SIGNS = {"exclusiveMinimum": ">", "minimum": "≥", "maximum": "≤"}
@@ -43,7 +43,7 @@ def reference() -> str:
 
     Where the default config gives no default it is that of the class.
     """
-    defaults = yaml.safe_load(CONFIG.read_text(encoding="utf-8"))
+    defaults: Any = read_configs(DEFAULTS)
     sections: dict[str, list[tuple[str, ...]]] = {"General": []}
     for path, schema in leaves(STUDY).items():
         top, *inner = path.split(".")

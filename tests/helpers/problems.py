@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from biogrip.arrays import Array
-from biogrip.fit.problem import Fit, TraceProblem, identifier, silent
+from biogrip.fit.problem import Fit, TraceProblem, silent
 from biogrip.judging.diagnosis import Diagnosis, diagnose
 from biogrip.judging.likelihood import Likelihood, make_likelihood
 from biogrip.physics.condensed import Condensed
@@ -17,6 +17,7 @@ from biogrip.physics.noise import Noise, add_noise, nuisance_basis
 from biogrip.physics.protocol import Course, sample_times
 from biogrip.physics.response import step_response, superpose
 from biogrip.physics.sample_model import SampleModel
+from biogrip_study.methods.registry import identifier
 from tests.helpers.default import STUDY
 
 MODEL = MODELS["generalized_maxwell"]

@@ -70,8 +70,8 @@ def ran(folder: Path, *command: str | Path, status: int = 0, **environment: str)
 
 # Processes for Snakemake come from one that has loaded it: of 4 s of a dry run that is 3.
 _LOADED = multiprocessing.get_context("forkserver")
-_USED = "snakemake.cli snakemake.report smart_open yte pandas biogrip.study.study"
-_USED += " biogrip.stages.job biogrip.command.settings"
+_USED = "snakemake.cli snakemake.report smart_open yte pandas biogrip_study.config.study"
+_USED += " biogrip_study.stages.job biogrip.command.settings"
 _LOADED.set_forkserver_preload(_USED.split())
 _PYTHONPATH = os.environ.get("PYTHONPATH")
 

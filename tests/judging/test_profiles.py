@@ -29,7 +29,7 @@ from biogrip.library import set_up, simulate
 from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.protocol import hold
 from biogrip.physics.sample_model import with_fixed
-from biogrip.stages.judgement import judge_quantities
+from biogrip_study.stages.judgement import judge_quantities
 from tests.helpers.identified import told
 from tests.helpers.problems import (
     GRIPPER,

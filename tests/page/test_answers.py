@@ -1,7 +1,7 @@
 from typing import Any
 
-from biogrip.page import answers
 from biogrip.physics.models import CANDIDATES
+from biogrip_study.page import answers
 
 TITLES = {"cell": "A cell", "drop": "A drop"}
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from biogrip.digits import legible
-from biogrip.page import answers
-from biogrip.page.page import entry_of, write_report
-from biogrip.records.identifications import read_verdicts
-from biogrip.records.rows import read_table
-from biogrip.study.study import load_given_study
+from biogrip.records import read_table
+from biogrip_study.config.study import load_given_study
+from biogrip_study.page import answers
+from biogrip_study.page.page import entry_of, write_report
+from biogrip_study.records.identifications import read_verdicts
 from tests.helpers.browser import Opened
 from tests.helpers.places import ROOT
 from tests.helpers.problems import MODEL, rotation

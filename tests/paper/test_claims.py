@@ -6,8 +6,9 @@ import pandas as pd
 import pytest
 import yaml
 
-from biogrip.physics.models import Published, Sample
-from biogrip.records.rows import write_arrays
+from biogrip.physics.models import Sample
+from biogrip_study.config.published import Published
+from biogrip_study.records.rows import write_arrays
 from tests.helpers.default import seen
 from tests.helpers.places import ROOT
 from workflow.paper import claims

@@ -11,14 +11,15 @@ from scipy.stats import gaussian_kde
 
 from biogrip import library
 from biogrip.errors import BiogripError
-from biogrip.fit.genome import GeneRange
+from biogrip.fit.search_range import GeneRange
 from biogrip.physics.gripper import torque
-from biogrip.physics.models import MODELS, Published, Sample
-from biogrip.records.identifications import READINGS, columns, read_identifications
-from biogrip.stages.identification import identify
-from biogrip.stages.targets import measure, simulate
-from biogrip.study.study import Study
-from biogrip.tables.layout import Column, ShownTable, write
+from biogrip.physics.models import MODELS, Sample
+from biogrip_study.config.published import Published
+from biogrip_study.config.study import Study
+from biogrip_study.records.identifications import READINGS, columns, read_identifications
+from biogrip_study.stages.identification import identify
+from biogrip_study.stages.targets import measure, simulate
+from biogrip_study.tables.layout import Column, ShownTable, write
 from tests.helpers.default import STUDY, seen, study_of
 from tests.helpers.places import ROOT
 from workflow.paper import readings

@@ -8,7 +8,6 @@ from scipy.linalg import expm
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.physics import calibration
 from biogrip.physics.gripper import (
     Arm,
     CombDrive,
@@ -19,6 +18,7 @@ from biogrip.physics.gripper import (
     voltage,
 )
 from biogrip.physics.noise import Noise, add_noise
+from biogrip_study.gripper import calibration
 from tests.helpers.default import STUDY, study_of
 from workflow.paper import mechanics
 

@@ -27,7 +27,7 @@ PHASES = (
 
 
 def simulated(network: Network, history: Course, time_s: Array) -> Array:
-    return simulated_response(NO_ARMS, network, history, time_s, nonlinear=False)[0]
+    return simulated_response(NO_ARMS, network, history, time_s)[0]
 
 
 def example(model: SampleModel) -> Network:

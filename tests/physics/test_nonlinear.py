@@ -12,10 +12,11 @@ from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.physics.gripper import Arm, Gripper, rotation_of_tip
 from biogrip.physics.models import MODELS, generalized_maxwell
-from biogrip.physics.nonlinear import correction, nonlinear_rotation
 from biogrip.physics.protocol import Course, Phase, evaluate, hold, join_phases
 from biogrip.physics.response import step_response, superpose
-from biogrip.physics.simulation import compute_grip, jaw_force
+from biogrip.physics.simulation import compute_grip
+from biogrip_study.gripper.nonlinear import correction, nonlinear_rotation
+from biogrip_study.gripper.simulation import jaw_force
 from tests.helpers.responses import random_samples
 
 ARM = Arm(1.0e-14, 3.3e-12, 4.4e-7)
@@ -184,7 +185,7 @@ def test_without_inertia_the_force_jumps(gripper: Gripper, steps: Course) -> Non
 
 def test_a_damper_is_pulled_from_the_drop_on(gripper: Gripper, steps: Course) -> None:
     """F = c_p delta': tau/b at first; after the drop (tau_2 - k phi)/b."""
-    grip = compute_grip(gripper, MODELS["damper"].network(10.0), steps, nonlinear=False)
+    grip = compute_grip(gripper, MODELS["damper"].network(10.0), steps)
     b, k_g = gripper.lever_m, 4.4e-7
     phi = 1.6e-9 / k_g * -math.expm1(-k_g * 200 / (2 * 10 * b * b))
     assert grip.largest_N == pytest.approx(1.6e-9 / b, rel=1e-5)
@@ -199,10 +200,10 @@ def test_a_damper_is_pulled_from_the_drop_on(gripper: Gripper, steps: Course) ->
 def test_pressed_throughout_or_never(gripper: Gripper, steps: Course) -> None:
     spring = MODELS["kelvin_voigt"].network([1.0, 0.0])
     for network in (generalized_maxwell(CELL), spring):
-        grip = compute_grip(gripper, network, steps, nonlinear=False)
+        grip = compute_grip(gripper, network, steps)
         assert (grip.pulls_from_s, grip.words()) == (None, None)
         # The start, when nothing presses yet, is not meant.
         assert 0.1 * grip.largest_N < grip.lowest_N < grip.largest_N
     nothing = join_phases((hold(10.0, 0.0),))
-    grip = compute_grip(gripper, spring, nothing, nonlinear=False)
+    grip = compute_grip(gripper, spring, nothing)
     assert (grip.largest_N, grip.lowest_N, grip.pulls_from_s) == (0, 0, None)

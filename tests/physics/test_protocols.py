@@ -9,11 +9,11 @@ import pytest
 from mpmath import mp, mpf
 
 from biogrip.arrays import Array
+from biogrip.config.experiment_blocks import PhaseBlock, ProtocolBlock
 from biogrip.library import set_up
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.gripper import torque as of_voltage
 from biogrip.physics.instruments import GRIPPER
-from biogrip.physics.misfit import SeriesMisfit, make_misfit
 from biogrip.physics.models import Sample, generalized_maxwell
 from biogrip.physics.protocol import (
     SWEEP,
@@ -28,8 +28,8 @@ from biogrip.physics.protocol import (
 )
 from biogrip.physics.response import phi_functions, step_response, superpose
 from biogrip.physics.roots import SMALLEST_GAP, separate
-from biogrip.physics.simulation import jaw_force
-from biogrip.study.experiment_blocks import PhaseBlock, ProtocolBlock
+from biogrip_study.gripper.simulation import jaw_force
+from biogrip_study.methods.misfit import SeriesMisfit, make_misfit
 from tests.helpers.responses import exact_50_digits, random_samples
 from tests.physics.test_contact import TABLE_2
 

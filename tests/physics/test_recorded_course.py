@@ -172,7 +172,7 @@ def test_a_sample_under_a_recorded_sinusoid_responds_as_under_the_true_one(name:
     scale = np.abs(expected).max()
     np.testing.assert_allclose(found[read], expected[read], atol=2e-4 * scale)
     network = model.network([parameters])
-    simulated = simulated_response(NO_ARMS, network, course, EVEN, nonlinear=False)[0]
+    simulated = simulated_response(NO_ARMS, network, course, EVEN)[0]
     np.testing.assert_allclose(simulated, found, atol=1e-12 * scale)
 
 

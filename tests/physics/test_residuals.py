@@ -12,7 +12,6 @@ from biogrip.arrays import Array
 from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import NO_ARMS, Gripper
 from biogrip.physics.instruments import GRIPPER
-from biogrip.physics.misfit import SeriesMisfit
 from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.modes import linear_responses
 from biogrip.physics.noise import nuisance_basis, with_uncertain, within, without
@@ -21,6 +20,7 @@ from biogrip.physics.residuals import Residuals, Trace
 from biogrip.physics.response import step_response, superpose
 from biogrip.physics.sample_model import SampleModel, with_fixed
 from biogrip.physics.simulation import simulated_response
+from biogrip_study.methods.misfit import SeriesMisfit
 from tests.helpers.problems import condensed_of
 from tests.helpers.responses import PROTOCOLS, log_range, random_samples
 from tests.helpers.responses import SAMPLING_TIMES as TIMES
@@ -181,7 +181,7 @@ def test_against_differences(
     def simulated(parameters: Array) -> Array:
         network = model.network([parameters])
         if not arms:
-            return simulated_response(NO_ARMS, network, torque, SEEN_S, nonlinear=False)[0]
+            return simulated_response(NO_ARMS, network, torque, SEEN_S)[0]
         return superpose(step_response(gripper, network, inertia=False), torque, SEEN_S)[0]
 
     np.testing.assert_allclose(phi, simulated(sample), rtol=1e-12, atol=1e-12 * np.abs(phi).max())

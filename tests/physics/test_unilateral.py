@@ -8,8 +8,8 @@ from biogrip.physics import models
 from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.protocol import Course, Phase, evaluate, hold, join_phases
 from biogrip.physics.response import step_response, superpose
-from biogrip.physics.simulation import jaw_force
-from biogrip.physics.unilateral import UnilateralResponse, unilateral_response
+from biogrip_study.gripper.simulation import jaw_force
+from biogrip_study.gripper.unilateral import UnilateralResponse, unilateral_response
 from tests.helpers.responses import random_samples
 
 # Slow arms, which differences can follow through contact and flight.

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from biogrip.errors import BiogripError
-from biogrip.records.rows import seeds_of
-from biogrip.stages import job
+from biogrip_study.records.rows import seeds_of
+from biogrip_study.stages import job
 from tests.helpers.default import STUDY, study_of
 
 NAME = "liquid_drop_2"
@@ -94,7 +94,7 @@ def test_every_seed_is_in_one_batch_and_full_ones_stay() -> None:
     [
         ("stages.targets", {"scipy", "pandas", "matplotlib", "biogrip.judging"}),
         ("stages.identification", {"scipy", "pandas", "matplotlib", "biogrip.judging"}),
-        ("stages.judgement", {"scipy.optimize", "pandas", "matplotlib", "biogrip.tables"}),
+        ("stages.judgement", {"scipy.optimize", "pandas", "matplotlib", "biogrip_study.tables"}),
         ("tables.cases", {"scipy", "matplotlib", "biogrip.judging.diagnosis"}),
         ("tables.study", {"scipy.stats", "matplotlib", "biogrip.judging.diagnosis"}),
         ("figures.course", {"scipy.stats", "biogrip.command"}),
@@ -103,6 +103,6 @@ def test_every_seed_is_in_one_batch_and_full_ones_stay() -> None:
 )
 def test_a_job_loads_nothing_large_that_it_does_not_use(module: str, unused: set[str]) -> None:
     """Loading pandas, `scipy.special` or `scipy.stats` takes longer than many a job."""
-    code = f"import sys, biogrip.{module}; print(*sys.modules)"
+    code = f"import sys, biogrip_study.{module}; print(*sys.modules)"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert not unused & set(run.stdout.split())

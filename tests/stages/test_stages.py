@@ -10,10 +10,10 @@ from biogrip.errors import BiogripError
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.models import Sample
 from biogrip.physics.protocol import Phase, hold, join_phases, sample_times
-from biogrip.records.traces import read_measurements, read_target
-from biogrip.stages import targets as target
-from biogrip.stages.identification import experiment_for
-from biogrip.stages.judgement import expect
+from biogrip_study.records.traces import read_measurements, read_target
+from biogrip_study.stages import targets as target
+from biogrip_study.stages.identification import experiment_for
+from biogrip_study.stages.judgement import expect
 from tests.helpers.default import STUDY, seen, study_of
 from tests.helpers.places import EXAMPLE
 

@@ -7,13 +7,14 @@ from typing import Any
 import pytest
 from jsonschema import Draft202012Validator
 
+from biogrip.config.loading import read_configs
+from biogrip.config.source import LARGEST_BYTES, read_config, read_source
 from biogrip.errors import BiogripError
-from biogrip.fit.problem import METHODS
 from biogrip.physics.gripper import torque
 from biogrip.physics.noise import Noise
-from biogrip.study.case_blocks import OVERRIDABLE
-from biogrip.study.source import LARGEST_BYTES, overlaid, read_config, read_source
-from biogrip.study.study import Study, load_given_study, load_study
+from biogrip_study.config.case_blocks import OVERRIDABLE
+from biogrip_study.config.study import DEFAULTS, Study, load_given_study, load_study
+from biogrip_study.methods.registry import SETTINGS
 from tests.helpers.key_reference import STUDY, file_schema, leaves
 from tests.helpers.places import CONFIG, ROOT
 
@@ -24,7 +25,7 @@ DROP = "sample: {model: liquid_drop, k: 1.0, k_p: 1.0, c: 1.0}"
 def load(tmp_path: Path, text: str) -> Study:
     file = tmp_path / "my.yaml"
     file.write_text(text)
-    return load_study(overlaid(read_config(CONFIG), read_config(file)), [CONFIG, file])
+    return load_study(read_configs([*DEFAULTS, file]), [*DEFAULTS, file])
 
 
 def refusal(tmp_path: Path, text: str) -> str:
@@ -36,7 +37,7 @@ def refusal(tmp_path: Path, text: str) -> str:
 
 
 def test_the_default_study_holds_the_papers_targets() -> None:
-    study = load_study(read_config(CONFIG), [CONFIG])
+    study = load_study(read_configs(DEFAULTS), DEFAULTS)
     targets = {name: case.parameters for name, case in study.cases.items()}
     assert targets == {
         "endothelial_cell": {"k": 35.0, "k_p": 12.3, "c": 299.9, "c_p": 1e-3},
@@ -107,7 +108,7 @@ def test_a_config_and_a_block_without_default_must_be_there(tmp_path: Path) -> N
     said = r"nowhere.yaml: cannot be read: No such file .* in the folder .*test_a_con"
     with pytest.raises(BiogripError, match=said):
         load_study({}, [tmp_path / "nowhere.yaml"])
-    config = read_config(CONFIG)
+    config = read_configs(DEFAULTS)
     del config["gripper"]["left"]["inertia_kgm2"]
     with pytest.raises(BiogripError, match=r"gripper.left.inertia_kgm2: is missing"):
         load_study(config, [])
@@ -207,7 +208,7 @@ def test_shipped_studies_load_by_the_schema(file: Path, monkeypatch: pytest.Monk
     monkeypatch.chdir(ROOT)
     Draft202012Validator.check_schema(SCHEMA)
     assert [e.message for e in Draft202012Validator(SCHEMA).iter_errors(read_config(file))] == []
-    assert load_study(overlaid(read_config(CONFIG), read_config(file)), [CONFIG, file]).cases
+    assert load_study(read_configs([*DEFAULTS, file]), [*DEFAULTS, file]).cases
 
 
 def test_every_key_says_what_it_means_and_every_number_has_bounds() -> None:
@@ -228,7 +229,7 @@ def test_every_block_refuses_unknown_keys() -> None:
 
 
 def test_a_case_may_override_the_blocks_of_the_study_and_of_every_method() -> None:
-    methods = {block for method in METHODS.values() for block in method.blocks}
+    methods = {*SETTINGS}
     assert methods < set(OVERRIDABLE)
     assert set(OVERRIDABLE) == set(STUDY.keys["cases"].values.keys) & set(STUDY.keys)
 

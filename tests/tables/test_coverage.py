@@ -6,12 +6,12 @@ import pytest
 from scipy.stats import binomtest
 
 from biogrip.errors import BiogripError
-from biogrip.records.identifications import INTERVALS
-from biogrip.records.rows import read_rows, write_object
-from biogrip.stages import judgement as stage
-from biogrip.stages import targets
-from biogrip.tables.layout import Column, ShownTable, convert, write
-from biogrip.tables.study import coverage, verdict_counts
+from biogrip.records import read_rows, write_object
+from biogrip_study.records.identifications import INTERVALS
+from biogrip_study.stages import judgement as stage
+from biogrip_study.stages import targets
+from biogrip_study.tables.layout import Column, ShownTable, convert, write
+from biogrip_study.tables.study import coverage, verdict_counts
 from tests.helpers.default import study_of
 
 CASE = "liquid_drop_2"

@@ -7,9 +7,11 @@ import pandas as pd
 import pytest
 from scipy.stats import binomtest
 
-from biogrip.fit.problem import METHODS
-from biogrip.physics.models import MODELS, Published, Sample
-from biogrip.records.identifications import (
+from biogrip.physics.models import MODELS, Sample
+from biogrip.records import write_object
+from biogrip_study.config.published import Published
+from biogrip_study.methods.registry import METHODS
+from biogrip_study.records.identifications import (
     ALL,
     ENCODABLE,
     MODEL_FITS,
@@ -19,9 +21,8 @@ from biogrip.records.identifications import (
     near_noise,
     share_with_limits,
 )
-from biogrip.records.rows import write_object
-from biogrip.tables import cases
-from biogrip.tables.study import methods, models
+from biogrip_study.tables import cases
+from biogrip_study.tables.study import methods, models
 from tests.helpers.default import STUDY, seen, study_of
 
 FOUND = {"k": 9.0, "k_p": 1.0, "c": 3.0, "c_p": 2.0}

@@ -6,10 +6,10 @@ import pandas as pd
 import pytest
 
 from biogrip.judging.likelihood import headlines
-from biogrip.records.identifications import columns
-from biogrip.records.rows import write_rows
-from biogrip.tables import sweeps as stage
-from biogrip.tables.sweeps import robustness
+from biogrip.records import write_rows
+from biogrip_study.records.identifications import columns
+from biogrip_study.tables import sweeps as stage
+from biogrip_study.tables.sweeps import robustness
 from tests.helpers.default import study_of
 from tests.helpers.problems import MODEL, rotation
 

@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
+from biogrip.command.hold import load_in_words
 from biogrip.command.options import Setting
-from biogrip.command.settings import Asked, case_of, load_in_words, read_trace
+from biogrip.command.settings import Asked, case_of, read_trace
+from biogrip.config.source import HOLD
 from biogrip.errors import BiogripError
 from biogrip.identify.data import trace_data
 from biogrip.identify.identify import identify
@@ -19,7 +21,6 @@ from biogrip.identify.prepare import _noise, prepare
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.physics.instruments import CONTROLLED
 from biogrip.physics.protocol import evaluate
-from biogrip.study.source import HOLD
 from biogrip.traces.columns import held_unit
 from biogrip.traces.reader import read_recording
 from tests.helpers.columns import columns_of

@@ -9,9 +9,9 @@ import pytest
 import yaml
 
 from biogrip.errors import BiogripError
-from biogrip.records import identifications as found
-from biogrip.records.traces import read_measurements, read_target
-from biogrip.tables.study import read_fits, read_intervals
+from biogrip_study.records import identifications as found
+from biogrip_study.records.traces import read_measurements, read_target
+from biogrip_study.tables.study import read_fits, read_intervals
 from tests.helpers.default import study_of
 from tests.helpers.runs import TINY
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from biogrip.study.source import overlaid
+from biogrip.config.source import overlaid
 from tests.helpers.runs import TINY, clone, dry_run, jobs_of, planned, results_of, snakemake
 
 # Of the study: what puts all cases together, and what of it has more than simulated traces.

@@ -4,7 +4,7 @@ from typing import Any
 import pytest
 
 from biogrip.cli import main
-from biogrip.study.source import overlaid
+from biogrip.config.source import overlaid
 from tests.helpers.identified import write_drop
 from tests.helpers.places import CONFIG
 from tests.helpers.runs import planned, snakemake

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from biogrip.digits import counted
 from biogrip.errors import BiogripError
-from biogrip.stages.job import logged, paths
-from biogrip.tables.layout import as_published
+from biogrip_study.stages.job import logged, paths
+from biogrip_study.tables.layout import as_published
 
 if TYPE_CHECKING:
     snakemake: Any

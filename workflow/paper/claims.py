@@ -24,23 +24,23 @@ from biogrip.arrays import Array
 from biogrip.judging.levels import DETERMINED_PERCENT
 from biogrip.judging.likelihood import bounds_percent
 from biogrip.judging.verdicts import DETERMINED
-from biogrip.physics.calibration import ARM_KEYS, FreeMotion, calibrate, free_motion
-from biogrip.physics.gripper import Gripper
+from biogrip.physics.gripper import ARM_KEYS, Gripper
 from biogrip.physics.noise import Noise, add_noise, rms, standard_deviation, stream
 from biogrip.physics.protocol import sample_times
 from biogrip.physics.simulation import simulated_response
-from biogrip.records.identifications import (
+from biogrip_study.config.study import Case, Study
+from biogrip_study.gripper.calibration import FreeMotion, calibrate, free_motion
+from biogrip_study.records.identifications import (
     near_noise,
     read_histories,
     read_identifications,
     read_readings,
     share_with_limits,
 )
-from biogrip.records.rows import RowFile
-from biogrip.stages.job import job_study, logged, paths
-from biogrip.study.study import Case, Study
-from biogrip.tables.cases import value_in_case
-from biogrip.tables.layout import Column, Row, ShownTable, titled, write
+from biogrip_study.records.rows import RowFile
+from biogrip_study.stages.job import job_study, logged, paths
+from biogrip_study.tables.cases import value_in_case
+from biogrip_study.tables.layout import Column, Row, ShownTable, titled, write
 
 if TYPE_CHECKING:
     snakemake: Any
@@ -273,7 +273,7 @@ def judge_grippers(
     judged = []
     for case in results.study.cases.values():
         device = case.gripper, case.network, case.torque
-        reading = simulated_response(*device, case.times_s, nonlinear=False)[0]
+        reading = simulated_response(*device, case.times_s)[0]
         noise = replace(case.noise, level_rad=rms(standard_deviation(reading, case.noise)))
         every = []
         for gripper in (case.gripper, *others(results, case.gripper)):

@@ -13,17 +13,17 @@ import numpy as np
 from scipy.special import chdtri
 
 from biogrip.digits import counted
-from biogrip.fit.genome import nearest_encodable
 from biogrip.judging.levels import DETERMINED_PERCENT
 from biogrip.judging.likelihood import bounds_percent
 from biogrip.judging.quantities import Quantity
 from biogrip.physics import gripper as actuator
 from biogrip.physics.protocol import sample_times
-from biogrip.records.traces import read_measurements
-from biogrip.stages.job import job_study, logged, paths
-from biogrip.study.study import Case, Study
-from biogrip.tables.cases import error_percent, value_in_case
-from biogrip.tables.layout import Column, Row, ShownTable, titled, write
+from biogrip_study.config.study import Case, Study
+from biogrip_study.methods.genome import encodable_values, nearest_encodable
+from biogrip_study.records.traces import read_measurements
+from biogrip_study.stages.job import job_study, logged, paths
+from biogrip_study.tables.cases import error_percent, value_in_case
+from biogrip_study.tables.layout import Column, Row, ShownTable, titled, write
 
 if TYPE_CHECKING:
     snakemake: Any
@@ -135,7 +135,8 @@ def printed_values(study: Study) -> ShownTable:
                 }
                 if quantity == "identified":
                     _, low, high = value_in_case(case, [name]) or (value, value, value)
-                    held = (genes.values >= low) & (genes.values <= high)
+                    values = encodable_values(genes)
+                    held = (values >= low) & (values <= high)
                     row |= {"printed_from": low, "printed_to": high}
                     row["encodable"] = "yes" if held.any() else "no"
                 if quantity == "identified" and target:

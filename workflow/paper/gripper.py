@@ -32,8 +32,8 @@ from biogrip.physics import gripper as actuator
 from biogrip.physics.gripper import LARGEST_M, SMALLEST_M, CombDrive, Gripper
 from biogrip.physics.protocol import evaluate, join_phases
 from biogrip.physics.simulation import simulated_response
-from biogrip.stages.job import job_study, logged, paths
-from biogrip.study.study import Study
+from biogrip_study.config.study import Study
+from biogrip_study.stages.job import job_study, logged, paths
 
 if TYPE_CHECKING:
     snakemake: Any
@@ -245,7 +245,7 @@ def _largest_rotation(study: Study) -> float:
     for case in study.cases.values():
         time_s = np.linspace(0.0, case.torque.end_s, 401)
         device = case.gripper, case.network, case.torque
-        rotation = simulated_response(*device, time_s, nonlinear=False)
+        rotation = simulated_response(*device, time_s)
         peaks.append(float(rotation.max()))
     return max(peaks) or _VISIBLE_RAD
 

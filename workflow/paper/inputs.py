@@ -4,9 +4,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from biogrip.physics.sample_model import SINGLE_BRANCH
-from biogrip.stages.job import job_study, logged
-from biogrip.study.study import Study
-from biogrip.tables.layout import Column, ShownTable, titled, write
+from biogrip_study.config.study import Study
+from biogrip_study.stages.job import job_study, logged
+from biogrip_study.tables.layout import Column, ShownTable, titled, write
 
 if TYPE_CHECKING:
     snakemake: Any

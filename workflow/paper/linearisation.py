@@ -17,14 +17,14 @@ from matplotlib.figure import Figure
 from biogrip.arrays import Array
 from biogrip.figures.style import BLUE, COLUMN_IN, TARGET, figure, panel, save, styled
 from biogrip.physics.gripper import Gripper
-from biogrip.physics.nonlinear import correction
 from biogrip.physics.protocol import Course
 from biogrip.physics.response import step_response, superpose
 from biogrip.physics.sample_model import Network
-from biogrip.records.rows import RowFile
-from biogrip.stages.job import job_study, logged, paths
-from biogrip.study.study import Case, Study
-from biogrip.tables.layout import Column, ShownTable, write
+from biogrip_study.config.study import Case, Study
+from biogrip_study.gripper.nonlinear import correction
+from biogrip_study.records.rows import RowFile
+from biogrip_study.stages.job import job_study, logged, paths
+from biogrip_study.tables.layout import Column, ShownTable, write
 
 if TYPE_CHECKING:
     snakemake: Any

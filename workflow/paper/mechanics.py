@@ -24,19 +24,16 @@ from biogrip.physics.gripper import (
     Gripper,
 )
 from biogrip.physics.noise import add_noise, rms, stream
-from biogrip.physics.nonlinear import nonlinear_rotation
 from biogrip.physics.protocol import Course, largest_load
 from biogrip.physics.response import LEFT, RIGHT, step_response, superpose
 from biogrip.physics.sample_model import Network
-from biogrip.physics.simulation import (
-    compute_grip,
-    jaw_force,
-    simulated_response,
-)
-from biogrip.physics.unilateral import unilateral_response
-from biogrip.stages.job import job_study, logged
-from biogrip.study.study import Case, Study
-from biogrip.tables.layout import Column, Row, ShownTable, titled, write
+from biogrip.physics.simulation import compute_grip, simulated_response
+from biogrip_study.config.study import Case, Study
+from biogrip_study.gripper.nonlinear import nonlinear_rotation
+from biogrip_study.gripper.simulation import jaw_force, target_grip
+from biogrip_study.gripper.unilateral import unilateral_response
+from biogrip_study.stages.job import job_study, logged
+from biogrip_study.tables.layout import Column, Row, ShownTable, titled, write
 
 if TYPE_CHECKING:
     snakemake: Any
@@ -213,7 +210,7 @@ def _mechanics_of(case: Case) -> list[Row]:
     end = np.array([np.nextafter(case.phases[0].duration_s, 0)])
     shortening = float(simulated_shortening(*given, end, nonlinear=case.nonlinear_target)[0, 0])
     force = float(jaw_force(*given, end, nonlinear=case.nonlinear_target)[0, 0])
-    grip = compute_grip(*given, nonlinear=case.nonlinear_target)
+    grip = target_grip(*given, nonlinear=case.nonlinear_target)
     own = case.gripper.jaw_stiffness_N_per_m
     of_all_sizes: Row = {
         "case": case.title,
@@ -332,14 +329,14 @@ def contact_loss(study: Study) -> ShownTable:
 def _loss_of(study_seed: int, case: Case) -> list[Row]:
     """Return a row for every quantity and the misfit; none if the jaws keep contact."""
     device = case.gripper, case.network, case.torque
-    if compute_grip(*device, nonlinear=False).pulls_from_s is None:
+    if compute_grip(*device).pulls_from_s is None:
         return []
     time_s = case.times_s
     free = unilateral_response(*device, time_s)
     if not free.parted_s:
         return []
     # As the targets of a case are written.
-    read = simulated_response(*device, time_s, nonlinear=False)[0], free.rotation[0]
+    read = simulated_response(*device, time_s)[0], free.rotation[0]
     held, let_go = (significant(each, 9) for each in read)
     rngs = [
         stream(study_seed, case.name, seed, "noise") for seed in range(min(case.seeds, _MOST_SEEDS))

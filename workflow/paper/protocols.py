@@ -16,11 +16,12 @@ from biogrip.figures.style import BLACK, BLUE, ORANGE, PAGE_IN, SHADE, figure, p
 from biogrip.judging.levels import DETERMINED_PERCENT
 from biogrip.judging.likelihood import bounds_percent
 from biogrip.physics.noise import standard_deviation
-from biogrip.physics.simulation import compute_grip, jaw_force, simulated_response
-from biogrip.records.identifications import read_batch, share_with_limits
-from biogrip.stages.job import job_study, logged, paths
-from biogrip.study.study import Case, Study
-from biogrip.tables.layout import Column, Row, ShownTable, titled, write
+from biogrip.physics.simulation import compute_grip, simulated_response
+from biogrip_study.config.study import Case, Study
+from biogrip_study.gripper.simulation import jaw_force
+from biogrip_study.records.identifications import read_batch, share_with_limits
+from biogrip_study.stages.job import job_study, logged, paths
+from biogrip_study.tables.layout import Column, Row, ShownTable, titled, write
 
 if TYPE_CHECKING:
     snakemake: Any
@@ -79,7 +80,7 @@ def _pairs(study: Study, identifications: list[Path]) -> list[tuple[Case, pd.Dat
 def _noise_rad(case: Case) -> float:
     """Return the standard deviation of a reading's noise."""
     device = case.gripper, case.network, case.torque
-    target = simulated_response(*device, case.times_s, nonlinear=False)[0]
+    target = simulated_response(*device, case.times_s)[0]
     return float(np.mean(standard_deviation(target, case.noise)))
 
 
@@ -88,7 +89,7 @@ def _rows(case: Case, found: pd.DataFrame, density: float, papers: float) -> Ite
 
     Densities of the noise, rad/√Hz, are the case's and that under the paper's protocol.
     """
-    grip = compute_grip(case.gripper, case.network, case.torque, nonlinear=False)
+    grip = compute_grip(case.gripper, case.network, case.torque)
     searched = case.experiment.searched.parameters
     bounds = bounds_percent(case.experiment, case.noise, case.parameters, case.times_s)
     for quantity, bound in bounds:

@@ -27,6 +27,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from biogrip.arrays import Array
+from biogrip.config.source import overlaid
 from biogrip.figures.style import (
     BLACK,
     BLUE,
@@ -39,18 +40,18 @@ from biogrip.figures.style import (
     styled,
 )
 from biogrip.keys import built
-from biogrip.records.identifications import (
+from biogrip_study.config.case_blocks import CaseBlock
+from biogrip_study.config.study import Case, Study
+from biogrip_study.methods.genome import encodable_values
+from biogrip_study.records.identifications import (
     near_noise,
     near_noise_words,
     read_readings,
     share_with_limits,
 )
-from biogrip.stages.job import job_study, logged, paths
-from biogrip.study.case_blocks import CaseBlock
-from biogrip.study.source import overlaid
-from biogrip.study.study import Case, Study
-from biogrip.tables.cases import interval_of, value_in_case
-from biogrip.tables.layout import Column, Row, ShownTable, titled, write
+from biogrip_study.stages.job import job_study, logged, paths
+from biogrip_study.tables.cases import interval_of, value_in_case
+from biogrip_study.tables.layout import Column, Row, ShownTable, titled, write
 
 if TYPE_CHECKING:
     snakemake: Any
@@ -103,7 +104,7 @@ def printable(study: Study, reading: str) -> dict[str, int]:
         changes = study.config.readings[reading].changes
         ranges = built(CaseBlock, overlaid(case.plain, changes)).search_range
         for name, printed in case.published.identified.items():
-            held = getattr(ranges, name).values
+            held = encodable_values(getattr(ranges, name))
             ends = {"exactly": (printed, printed), "rounded": interval_of(printed, None, None)}
             ends["with_error"] = (value_in_case(case, [name]) or ends["rounded"])[-2:]
             counts["values"] += 1

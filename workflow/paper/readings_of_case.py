@@ -9,21 +9,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.fit.genetic import identify_many
+from biogrip.config.source import overlaid
 from biogrip.fit.least_squares import fit_from
 from biogrip.fit.problem import Fit, TraceProblem
 from biogrip.keys import built
 from biogrip.physics.noise import add_noise, rms, stream
 from biogrip.physics.sample_model import SINGLE_BRANCH
-from biogrip.records.identifications import READINGS
-from biogrip.records.traces import read_target
-from biogrip.stages.identification import groups
-from biogrip.stages.job import arguments, logged
-from biogrip.stages.targets import response
-from biogrip.study.case_blocks import CaseBlock
-from biogrip.study.source import overlaid
-from biogrip.study.study import Case
 from biogrip.terminal import Progress
+from biogrip_study.config.case_blocks import CaseBlock
+from biogrip_study.config.study import Case
+from biogrip_study.methods.genetic import identify_many
+from biogrip_study.records.identifications import READINGS
+from biogrip_study.records.traces import read_target
+from biogrip_study.stages.identification import groups
+from biogrip_study.stages.job import arguments, logged
+from biogrip_study.stages.targets import response
 
 if TYPE_CHECKING:
     snakemake: Any
@@ -71,7 +71,7 @@ def _best(case: Case, name: str, seeds: Sequence[int], problems: list[TraceProbl
     reading, runs = case.study.config.readings[name], list[list[Fit]]()
     for number in range(reading.runs):
         rngs = _streams(case, seeds, f"genetic {number}" if number else "genetic")
-        runs.append(identify_many(problems, case.block.genetic_algorithm, rngs))
+        runs.append(identify_many(problems, case.block.method("genetic"), rngs))
     best = [min(of_trace, key=attrgetter("misfit")) for of_trace in zip(*runs, strict=True)]
     if not reading.polished:
         return best

@@ -7,13 +7,13 @@ from pathlib import Path
 import yaml
 from snakemake.exceptions import WorkflowError
 
-import biogrip
+import biogrip_study
 
 # Rules of one clone and code of another give what neither does.
 TOP = Path(workflow.current_basedir.get_path_or_uri(secret_free=True)).parents[1]
-for package in (TOP / "src" / "biogrip", TOP.parent):
-    imported = Path(biogrip.__file__).parent
-    if (package / "study" / "source.py").is_file() and not package.samefile(imported):
+for package in (TOP / "src" / "biogrip_study", TOP.parent):
+    imported = Path(biogrip_study.__file__).parent
+    if (package / "config" / "study.py").is_file() and not package.samefile(imported):
         raise WorkflowError(
             f"The rules are those of {TOP}, but the code and the default config are those of "
             f"{imported}, from which biogrip is installed. Use the environment of this clone "
@@ -21,13 +21,13 @@ for package in (TOP / "src" / "biogrip", TOP.parent):
         )
 
 from biogrip.errors import BiogripError
-from biogrip.files import digest_of, software
-from biogrip.fit.problem import METHODS
+from biogrip.files import digest_of
 from biogrip.physics.instruments import INSTRUMENTS
-from biogrip.stages.job import CASE_KEYS, STUDY_KEYS, batch_names, keys_of_cases, settings
-from biogrip.study.study import load_given_study
 from biogrip.traces.measurement_block import MeasurementBlock
-from biogrip.study.source import default_config, shipped
+from biogrip_study.config.shipped import shipped, software
+from biogrip_study.config.study import load_given_study
+from biogrip_study.methods.registry import METHODS
+from biogrip_study.stages.job import CASE_KEYS, STUDY_KEYS, batch_names, keys_of_cases, settings
 
 
 def usable(read, *given):

@@ -95,7 +95,7 @@ rule page:
             *(key for key in STUDY_KEYS if key != "cases"),
             *keys_of_cases(STUDY, *CASE_KEYS),
         ),
-        stages=["page.page.write_report"],
+        stages=["biogrip_study.page.page.write_report"],
     message:
         "Writing the page of the study"
     script:

@@ -32,8 +32,8 @@ rule sweep:
             *keys_of_cases(STUDY, *CASE_KEYS),
         ),
         stages=[
-            *("tables.sweeps.judge", "tables.sweeps.write_robustness"),
-            "figures.overview.save_robustness",
+            *("biogrip_study.tables.sweeps.judge", "biogrip_study.tables.sweeps.write_robustness"),
+            "biogrip_study.figures.overview.save_robustness",
         ],
     message:
         "Judging and drawing the sweep {wildcards.sweep}"
@@ -44,7 +44,9 @@ rule sweep:
 if STUDY.config.traces:
     # Imported here, for it loads much that a study without a table needs not.
     from biogrip.command.options import Setting
-    from biogrip.command.settings import check_settings, read_table
+    from biogrip.command.settings import check_settings
+    from biogrip.command.sheet import read_table
+    from biogrip.config.loading import trace_defaults
 
     MODEL = Setting("traces.model", ("sample", "model"), STUDY.config.traces.model)
     CONFIG = Path(STUDY.config.traces.config) if STUDY.config.traces.config else None
@@ -61,7 +63,7 @@ if STUDY.config.traces:
         input:
             lambda wildcards: [str(row.trace) for row in rows_of(wildcards) if row.trace.is_file()],
             config=STUDY.config.traces.config or [],
-            default=str(default_config()),
+            default=str(trace_defaults()),
             table=ancient(STUDY.config.traces.table),
         output:
             found="results/traces/batches/{rows}.csv",
@@ -76,7 +78,7 @@ if STUDY.config.traces:
         params:
             **settings_of(),
             model=STUDY.config.traces.model,
-            configs=[digest_of(file) for file in (CONFIG, default_config()) if file],
+            configs=[digest_of(file) for file in (CONFIG, trace_defaults()) if file],
             rows=lambda wildcards: [
                 [
                     *(str(row.trace), digest_of(row.trace)),
@@ -101,7 +103,7 @@ if STUDY.config.traces:
             "results/logs/traces.log",
         params:
             rows=len(ROWS),
-            stages=["command.outputs.join_tables"],
+            stages=["biogrip.command.outputs.join_tables"],
         message:
             "Putting together the tables of all traces"
         script:

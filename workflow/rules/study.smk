@@ -10,7 +10,7 @@ rule target:
         case=names(SIMULATED),
     params:
         **settings_of("actuator", "gripper", "contact", "models", *SAMPLE, *SAMPLING),
-        stages=["stages.targets.simulate"],
+        stages=["biogrip_study.stages.targets.simulate"],
     message:
         "Simulating the response of {wildcards.case}"
     script:
@@ -29,7 +29,7 @@ rule measurement:
         case=names(SIMULATED),
     params:
         **settings_of("study_seed", "actuator", NOISE, *SAMPLE, *SAMPLING),
-        stages=["stages.targets.measure"],
+        stages=["biogrip_study.stages.targets.measure"],
     message:
         "Adding noise to {wildcards.case}, {wildcards.batch}"
     script:
@@ -51,7 +51,7 @@ rule recording:
         recorded=lambda wildcards: {
             "recorded": digest_of(Path(STUDY.case(wildcards.case).block.measurement.file))
         },
-        stages=["stages.targets.record"],
+        stages=["biogrip_study.stages.targets.record"],
     message:
         "Reading the recorded trace of {wildcards.case}"
     script:
@@ -68,7 +68,7 @@ rule calibration:
         case=names(CALIBRATED),
     params:
         **settings_of("study_seed", "actuator", "gripper", "calibration", *SAMPLE),
-        stages=["stages.targets.calibrate_gripper"],
+        stages=["biogrip_study.stages.targets.calibrate_gripper"],
     message:
         "Calibrating the gripper of {wildcards.case} without a sample"
     script:
@@ -90,8 +90,8 @@ rule identification:
         runtime=120,
     params:
         **settings_of("study_seed", "actuator", *FIT),
-        method=lambda wildcards: settings(STUDY, METHODS[wildcards.method].blocks, wildcards.case),
-        stages=["stages.identification.identify"],
+        method=lambda wildcards: settings(STUDY, METHODS[wildcards.method].settings, wildcards.case),
+        stages=["biogrip_study.stages.identification.identify"],
     message:
         "Identifying {wildcards.case} by {wildcards.method}, {wildcards.batch}"
     script:
@@ -119,7 +119,7 @@ rule judgement:
             *("study_seed", "actuator", *FIT, *SAMPLING, NOISE),
             *("identifiability.confidence", "least_squares"),
         ),
-        stages=["stages.judgement.judge", "stages.judgement.expect"],
+        stages=["biogrip_study.stages.judgement.judge", "biogrip_study.stages.judgement.expect"],
     message:
         "Computing confidence limits for the first trace of {wildcards.case}"
     script:
@@ -134,7 +134,7 @@ use rule judgement as recorded_judgement with:
         case=names(STUDY.recorded),
     params:
         **settings_of("measurement.start_s", "model_selection"),
-        stages=["stages.judgement.judge"],
+        stages=["biogrip_study.stages.judgement.judge"],
 
 
 rule intervals:
@@ -157,7 +157,7 @@ rule intervals:
             *("study_seed", "actuator", *FIT, *SAMPLING, NOISE, "least_squares"),
             *("identifiability.confidence", "identifiability.verdicts_every"),
         ),
-        stages=["stages.judgement.estimate"],
+        stages=["biogrip_study.stages.judgement.estimate"],
     message:
         "Estimating intervals of {wildcards.case}, {wildcards.batch}"
     script:
@@ -178,7 +178,7 @@ rule model_fits:
         runtime=60,
     params:
         **settings_of("study_seed", "actuator", *FIT, "model_selection", "least_squares"),
-        stages=["stages.identification.fit"],
+        stages=["biogrip_study.stages.identification.fit"],
     message:
         "Fitting every sample model to {wildcards.case}, {wildcards.batch}"
     script:

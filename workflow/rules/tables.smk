@@ -24,7 +24,10 @@ rule case_tables:
         case=names(STUDY.cases),
     params:
         **settings_of("actuator", "methods", "seeds", "evaluation", "title", "published", *FIT),
-        stages=["stages.identification.join", "tables.cases.write_tables"],
+        stages=[
+            "biogrip_study.stages.identification.join",
+            "biogrip_study.tables.cases.write_tables",
+        ],
     message:
         "Writing the tables of {wildcards.case}"
     script:
@@ -69,7 +72,7 @@ rule convert_table:
     localrule: True
     params:
         **settings_of(),
-        stages=["tables.layout.write_converted"],
+        stages=["biogrip_study.tables.layout.write_converted"],
     message:
         "Writing the table {wildcards.name} as {wildcards.format}"
     script:

@@ -2,19 +2,19 @@
 
 from pathlib import Path
 
-from biogrip.figures import course, fit, likelihood
 from biogrip.figures.style import save, styled
-from biogrip.page.page import write_summary
-from biogrip.stages.job import arguments, job_case, logged, paths
+from biogrip_study.figures import case_fit, case_likelihood, course
+from biogrip_study.page.page import write_summary
+from biogrip_study.stages.job import arguments, job_case, logged, paths
 
 DRAWINGS = {
     "convergence": course.draw_convergence,
     "evolution": course.draw_evolution,
     "waterfall": course.draw_waterfall,
-    "fit": fit.draw_fits,
-    "judged_fit": fit.draw_judged_fit,
-    "profiles": likelihood.draw_profiles,
-    "force": fit.draw_force,
+    "fit": case_fit.draw_fits,
+    "judged_fit": case_fit.draw_judged_fit,
+    "profiles": case_likelihood.draw_profiles,
+    "force": case_fit.draw_force,
     "scatter": course.draw_scatter,
 }
 

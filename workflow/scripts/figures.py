@@ -1,9 +1,9 @@
 """Draw the figures of the study, as far as it has what they show."""
 
-from biogrip.figures import overview
-from biogrip.figures.overview import draw_answer, shown_cases
 from biogrip.figures.style import save, styled
-from biogrip.stages.job import job_study, logged, paths
+from biogrip_study.figures import overview
+from biogrip_study.figures.overview import draw_answer, shown_cases
+from biogrip_study.stages.job import job_study, logged, paths
 
 with logged(snakemake):
     study = job_study(snakemake)

@@ -1,11 +1,11 @@
-"""Do the stages that the rule names: functions, by their modules in `biogrip`."""
+"""Do the stages that the rule names: functions, by their full names."""
 
 from importlib import import_module
 
-from biogrip.stages.job import arguments, logged
+from biogrip_study.stages.job import arguments, logged
 
 with logged(snakemake):
     for stage in snakemake.params.stages:
         module, _, name = stage.rpartition(".")
-        function = getattr(import_module(f"biogrip.{module}"), name)
+        function = getattr(import_module(module), name)
         function(**arguments(snakemake, function))

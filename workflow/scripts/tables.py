@@ -1,9 +1,9 @@
 """Write the tables of the study, as far as it has what they are of."""
 
-from biogrip.stages.job import job_study, logged, paths
-from biogrip.tables import cases
-from biogrip.tables.layout import write
-from biogrip.tables.study import coverage, methods, models, verdict_counts
+from biogrip_study.stages.job import job_study, logged, paths
+from biogrip_study.tables import cases
+from biogrip_study.tables.layout import write
+from biogrip_study.tables.study import coverage, methods, models, verdict_counts
 
 with logged(snakemake):
     study = job_study(snakemake)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from biogrip.command.files import identify_files
 from biogrip.command.options import Setting
-from biogrip.stages.job import logged
+from biogrip_study.stages.job import logged
 
 with logged(snakemake), Path(snakemake.log[0]).open("a") as log, redirect_stdout(log):
     config = Path(snakemake.input.config) if snakemake.input.config else None

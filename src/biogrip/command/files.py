@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from biogrip import __version__
+from biogrip.command.hold import load_in_words
 from biogrip.command.options import Setting
 from biogrip.command.outputs import (
     WRITTEN_BY,
@@ -27,19 +28,15 @@ from biogrip.command.outputs import (
     table_of,
     write_result,
 )
-from biogrip.command.settings import (
-    Asked,
-    check_settings,
-    is_table,
-    load_in_words,
-    read_table,
-    read_trace,
-)
+from biogrip.command.settings import Asked, check_settings, read_trace
+from biogrip.command.sheet import is_table, read_table
 from biogrip.command.words import in_columns, in_words
+from biogrip.config.case import SampleCase
+from biogrip.config.loading import trace_defaults
 from biogrip.errors import BiogripError
 from biogrip.files import digest_of, software
 from biogrip.fit.experiment import Experiment
-from biogrip.fit.genome import SearchRange
+from biogrip.fit.search_range import SearchRange
 from biogrip.identify.data import trace_data
 from biogrip.identify.identify import STEPS, budget, identify_alike
 from biogrip.identify.other_fits import Trace
@@ -47,9 +44,7 @@ from biogrip.identify.prepare import prepare
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.keys import plain
 from biogrip.processes import end_with
-from biogrip.records.rows import write_rows
-from biogrip.study.source import default_config
-from biogrip.study.study import Case
+from biogrip.records import write_rows
 from biogrip.terminal import Progress, visible
 from biogrip.traces.columns import trace_file_problem
 from biogrip.traces.reader import form_in_words, is_usual
@@ -243,7 +238,7 @@ def side_by_side(work: Callable[[J], T], jobs: Sequence[J], most: int) -> Iterat
 
 def _made_from(asked: Asked) -> str:
     """Return in one line what the result of a trace follows from."""
-    trace, default = digest_of(asked.trace), digest_of(default_config())
+    trace, default = digest_of(asked.trace), digest_of(trace_defaults())
     return repr((software(), default, str(asked.trace), trace, asked.given))
 
 
@@ -254,7 +249,7 @@ def identify_batch(
     alone = len(asked) == 1 and outputs is not None
     # Before anything is read: what is changed meanwhile is identified again.
     made_from = [] if outputs is None else [*map(_made_from, asked)]
-    read: dict[int, tuple[Case, Trace]] = {}
+    read: dict[int, tuple[SampleCase, Trace]] = {}
     refused: dict[str, str] = {}
     outcome = Outcome([], {})
     with Progress(asked[0].name if alone else "", 1 + STEPS, live=alone, quiet=not alone) as told:
@@ -288,7 +283,7 @@ def identify_batch(
 
 def _judge_batch(
     asked: Sequence[Asked],
-    read: Mapping[int, tuple[Case, Trace]],
+    read: Mapping[int, tuple[SampleCase, Trace]],
     refused: dict[str, str],
     progress: Progress,
 ) -> dict[int, Diagnosis]:
@@ -336,7 +331,7 @@ def _caught(asked: Asked, refused: dict[str, str]) -> Iterator[None]:
 
 
 def data_of(
-    diagnosis: Diagnosis, case: Case, trace: str, given: Mapping[str, Any]
+    diagnosis: Diagnosis, case: SampleCase, trace: str, given: Mapping[str, Any]
 ) -> dict[str, Any]:
     """Return all that is said of a trace as plain data, with a config that repeats it.
 
@@ -363,10 +358,10 @@ def data_of(
     }
 
 
-def _assumed(found: Experiment, case: Case, tried: Sequence[str]) -> dict[str, Any]:
+def _assumed(found: Experiment, case: SampleCase, tried: Sequence[str]) -> dict[str, Any]:
     """Return what an identification relies on: its model, and a config that repeats it."""
     asked = case.block.identifiability
-    blocks = ["instrument", "protocol", "search_range", "measurement", "models", "least_squares"]
+    blocks = ["instrument", "protocol", "search_range", "measurement", "least_squares"]
     blocks += ["gripper"] if case.instrument.has_jaws else []
     if case.record is not None or case.instrument.sweeps:
         blocks.remove("protocol")
@@ -380,9 +375,9 @@ def _assumed(found: Experiment, case: Case, tried: Sequence[str]) -> dict[str, A
     return {
         "model": case.sample.candidate,
         **{name: plain(getattr(block, name)) for name in blocks},
-        **({"actuator": plain(case.study.actuator)} if case.instrument.has_jaws else {}),
+        **({"actuator": plain(case.common.actuator)} if case.instrument.has_jaws else {}),
         "fixed": case.block.fixed,
         "identifiability": {key: plain(getattr(asked, key)) for key in ("confidence", "at_s")},
         "model_selection": {"models": list(tried)},
-        "study_seed": case.study.config.study_seed,
+        "study_seed": case.common.study_seed,
     }

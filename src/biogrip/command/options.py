@@ -46,7 +46,7 @@ def _start(text: str) -> tuple[Path, Any]:
 
 
 def _hold(text: str) -> tuple[Path, Any]:
-    from biogrip.study.source import HOLD
+    from biogrip.config.source import HOLD
     from biogrip.traces.columns import number_and_unit
 
     number, unit = number_and_unit(text)
@@ -71,7 +71,7 @@ def _at(text: str) -> tuple[Path, Any]:
 
 
 def _any_key(text: str) -> tuple[Path, Any]:
-    from biogrip.study.source import value_of
+    from biogrip.config.source import value_of
 
     key, found, value = text.partition("=")
     if not (key and found):

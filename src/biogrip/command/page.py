@@ -32,7 +32,7 @@ from biogrip.judging.cells import CELL, Told, compare, gather, shared_columns
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.judging.doubts import DOUBTFUL, OK, REJECTED
 from biogrip.judging.without_model import LEVEL, level_turned
-from biogrip.page.page import TEMPLATES, data_url
+from biogrip.page.templates import data_url, environment
 from biogrip.physics.protocol import evaluate, hold, join_phases
 from biogrip.physics.simulation import simulated_response
 from biogrip.terminal import visible_lines
@@ -68,7 +68,7 @@ def draw_level(diagnosis: Diagnosis, data: Mapping[str, Any]) -> Figure:
     told = diagnosis.without_model(times.tolist(), [LEVEL]).told
     step = join_phases((hold(2 * times[-1], 1.0),), deforms=experiment.instrument.deforms)
     network = experiment.searched.network(np.exp(diagnosis.likelihood.best))
-    best = simulated_response(experiment.gripper, network, step, times, nonlinear=False)[0]
+    best = simulated_response(experiment.gripper, network, step, times)[0]
     turned = level_turned(diagnosis.likelihood.problem.residuals) or (lambda response: response)
     drawn = style.figure(style.COLUMN_IN, 2.4)
     axes = drawn.subplots()
@@ -161,25 +161,29 @@ def write_page(outcome: Outcome, page: Path) -> None:
     assumed: dict[str, dict[str, Any]] = {each["trace"]: each["assumed"] for each in traces}
     shared = common([*assumed.values()])
     own = {trace: _as_yaml(beyond(block, shared)) for trace, block in assumed.items()}
-    text = TEMPLATES.get_template("traces.html.j2").render(
-        traces=traces,
-        refused={trace: visible_lines(reason) for trace, reason in outcome.refused.items()},
-        pictures=outcome.pictures,
-        figure_of_all=figure_of_all,
-        groups=groups,
-        set_up=set_up,
-        methods=paragraph([*set_up, *further]),
-        several=several,
-        columns=columns,
-        copied=copied,
-        names=list(dict.fromkeys(name for own in copied.values() for name in own)),
-        shared=_as_yaml(shared),
-        own=own,
-        many=len(traces) > _MOST_OPEN,
-        marks=_MARKS,
-        counts={status: sum(each["fit"] == status for each in traces) for status in _MARKS},
-        words=words,
-        written_by=f"{WRITTEN_BY} {__version__}",
+    text = (
+        environment()
+        .get_template("traces.html.j2")
+        .render(
+            traces=traces,
+            refused={trace: visible_lines(reason) for trace, reason in outcome.refused.items()},
+            pictures=outcome.pictures,
+            figure_of_all=figure_of_all,
+            groups=groups,
+            set_up=set_up,
+            methods=paragraph([*set_up, *further]),
+            several=several,
+            columns=columns,
+            copied=copied,
+            names=list(dict.fromkeys(name for own in copied.values() for name in own)),
+            shared=_as_yaml(shared),
+            own=own,
+            many=len(traces) > _MOST_OPEN,
+            marks=_MARKS,
+            counts={status: sum(each["fit"] == status for each in traces) for status in _MARKS},
+            words=words,
+            written_by=f"{WRITTEN_BY} {__version__}",
+        )
     )
     write_text(page, text)
 

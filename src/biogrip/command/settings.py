@@ -1,6 +1,6 @@
-"""What is asked of recorded traces, and the study of one case that each of them is.
+"""What is asked of recorded traces, and the case that each of them is.
 
-A setting is a key of the config with a value. Over the default study lies the user's config, over
+A setting is a key of the config with a value. Over the defaults lies the user's config, over
 that the options of the command, and over these the cells of a table of traces. All are checked as
 a config is; messages name the file and line, the option, or the row of the table.
 
@@ -9,49 +9,38 @@ of the trace, from ``--hold``, or from a column of the file, ``--load``; where a
 modulus is read, a hold of 1 needs no option.
 """
 
-import csv
-import os
 import re
-from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+import sys
+from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
-from difflib import get_close_matches
-from io import StringIO
-from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.command.options import OPTIONS, Setting
-from biogrip.command.outputs import COLUMNS
-from biogrip.digits import counted, plain
-from biogrip.errors import BiogripError, nearest
-from biogrip.identify.other_fits import Trace
-from biogrip.physics.instruments import GRIPPER, INSTRUMENTS, Instrument
-from biogrip.physics.models import ALIASES, CANDIDATES
-from biogrip.study.experiment_blocks import LONGEST_S, SHORTEST_S
-from biogrip.study.messages import checked, with_numbers
-from biogrip.study.source import (
+from biogrip.command.hold import remarks_on_hold
+from biogrip.command.options import Setting
+from biogrip.config.case import SampleCase
+from biogrip.config.experiment_blocks import LONGEST_S, SHORTEST_S
+from biogrip.config.loading import load, read_config_of, read_configs, trace_defaults
+from biogrip.config.messages import checked, with_numbers
+from biogrip.config.source import (
     HOLD,
     KeyPath,
     Source,
-    default_config,
-    dotted,
     keys_in,
     overlaid,
-    value_of,
+    read_source,
 )
-from biogrip.study.study import Case, load_study, read_configs
-from biogrip.terminal import visible
+from biogrip.config.trace_blocks import TraceConfig
+from biogrip.errors import BiogripError
+from biogrip.physics.instruments import GRIPPER, INSTRUMENTS, Channel, Instrument
+from biogrip.physics.models import ALIASES, CANDIDATES
 from biogrip.traces.columns import (
     held_unit,
-    listed,
-    number_and_unit,
     place,
-    trace_file_problem,
 )
 from biogrip.traces.measurement_block import ARRAYS, READINGS, ByOptions, MeasurementBlock
 from biogrip.traces.reader import Recording, read_recording, recording_of_arrays
@@ -59,7 +48,6 @@ from biogrip.traces.reader import Recording, read_recording, recording_of_arrays
 MODEL = "generalized_maxwell"
 """Sample model of traces of which nothing says another."""
 
-_FILES = ("file", "filename", "filepath", "path", "trace", "tracefile")
 
 TRACE = "TRACE"
 """Place of a trace that no table lists."""
@@ -67,24 +55,13 @@ TRACE = "TRACE"
 LOAD = ("measurement", "load")
 """Key of the column of what was controlled."""
 
-_OF_NUMBERS = ("hold", "noise", "noise_share", "start", "from", "until")
-_OF_WORDS = ("noise_model", "offset", "drift", "reading", "sphere")
-# Other names of what is held.
-_HELD = ("held", "load", "pressure_Pa", "indentation_m")
 _PROTOCOLS = (HOLD, LOAD, ("protocol",))
 _PRONY = re.compile(r"prony_?([1-8])")
-# Share of the largest load so far below which a contact shrinks, not only scatters.
-_STAYS = 0.9
 # What a sphere's force and indentation count as.
 _BY_SPHERE = {"force": "stress", "displacement": "strain"}
 # Of each group of keys of the measurement, the one that is set last replaces the others.
 _ONE_OF = {"start_s", "fit_start"}, {*READINGS}
 _MOST_SHOWN = 10
-_SEPARATORS = ",;\t"
-# Blocks whose numbers are an instrument's.
-_INSTRUMENT = ("gripper", "actuator")
-_OF_RESULTS = re.compile(r".* (verdict|value|low|high)( \(.*\))?")
-_HEAD_BYTES = 100_000
 
 
 @dataclass(frozen=True)
@@ -94,7 +71,7 @@ class Asked:
     trace: Path
     """CSV file."""
     config: Path | None = None
-    """YAML file laid over the default study: gripper, protocol, search range, ..."""
+    """YAML file laid over the defaults: gripper, protocol, search range, ..."""
     settings: tuple[Setting, ...] = ()
     """Settings laid over the config, the later over the earlier."""
     place: str = TRACE
@@ -128,10 +105,10 @@ class Asked:
 
         A sphere's force and indentation are what they count as.
         """
-        blocks = read_configs(self.configs)
+        blocks, _ = read_config_of(TraceConfig, self.configs)
         for setting in self.settings:
             blocks = _laid_over(blocks, setting)
-        measured = _measured(blocks)
+        measured = measured_keys(blocks)
         if measured.get("sphere") is None:
             return blocks
         for name in {*measured} & {*_BY_SPHERE.values()}:
@@ -149,7 +126,7 @@ class Asked:
         return read_recording(self.trace, columns)
 
 
-def _measured(blocks: Mapping[str, Any]) -> dict[str, Any]:
+def measured_keys(blocks: Mapping[str, Any]) -> dict[str, Any]:
     """Return the keys of the measurement; none where no block is given for it."""
     measured = blocks.get("measurement")
     return measured if isinstance(measured, dict) else {}
@@ -160,7 +137,7 @@ def _laid_over(blocks: dict[str, Any], setting: Setting) -> dict[str, Any]:
     path, value = setting.path, deepcopy(setting.value)
     for group in _ONE_OF if path[0] == "measurement" else ():
         for name in group if group & {*path[1:2]} else ():
-            _measured(blocks).pop(name, None)
+            measured_keys(blocks).pop(name, None)
     # A candidate's name says its branches, too.
     name = str(value).lower() if path == ("sample", "model") else ""
     if prony := _PRONY.fullmatch(name):
@@ -173,7 +150,7 @@ def _laid_over(blocks: dict[str, Any], setting: Setting) -> dict[str, Any]:
     return overlaid(blocks, value)
 
 
-def read_trace(asked: Asked) -> tuple[Recording, Case]:
+def read_trace(asked: Asked) -> tuple[Recording, SampleCase]:
     """Read a trace, and return it with the case that it is.
 
     A `BiogripError` has file, line and column, or setting, that cannot be used.
@@ -185,91 +162,71 @@ def read_trace(asked: Asked) -> tuple[Recording, Case]:
     return replace(recording, remarks_before=remarks_on_hold(recording, case, asked.given)), case
 
 
-def study_of(asked: Asked) -> tuple[str, dict[str, Any], Recording | None, Array | None]:
-    """Return the study of one case that a trace is, not checked, and the name of the case.
-
-    The trace comes along if its protocol follows from it, and what was controlled if it was
-    recorded.
-    """
-    given = asked.given
-    if len(found := [key for key in _PROTOCOLS if key in keys_in(given)]) > 1:
-        of_config = [*keys_in(read_configs(asked.configs))]
-        said = [".".join(key) + f" of {asked.config}" * (key in of_config) for key in found]
-        raise BiogripError(f"{asked.place}: found {' and '.join(said)}; allowed is one of them.")
-    merged = overlaid(read_configs([default_config()]), given)
-    merged, recording, record = _with_instrument(merged, given, asked)
-    # Cases and a table of the config are meant for the workflow.
-    for name in ("only", "traces"):
-        merged.pop(name, None)
-    name = re.sub(r"[^A-Za-z0-9_-]", "_", asked.trace.stem)[:60]
-    case = name if re.match("[A-Za-z]", name) else f"trace_{name}"
-    merged["cases"] = {case: {"sample": overlaid({"model": MODEL}, merged.pop("sample", {}))}}
-    return case, merged, recording, record
-
-
-def case_of(asked: Asked) -> tuple[Case, Recording | None]:
+def case_of(asked: Asked) -> tuple[SampleCase, Recording | None]:
     """Return the case that a trace is, and the trace if its protocol follows from it.
 
     A `BiogripError` has option, row, or file, line and key, if settings or config cannot be used.
     """
-    case, merged, recording, record = study_of(asked)
-    files = [default_config(), *asked.configs]
+    given = asked.given
+    _refuse_two_protocols(asked, given)
+    files = [trace_defaults(), *asked.configs]
+    merged = overlaid(read_configs([trace_defaults()]), given)
+    merged, recording, record = _with_instrument(merged, given, asked)
+    merged["sample"] = overlaid({"model": MODEL}, merged.get("sample", {}))
     known = {*keys_in(read_configs(files))}
-    sources = [_source(setting, known, merged, case) for setting in asked.settings]
-    try:
-        study = load_study(merged, files, over=sources)
-    except BiogripError as error:
-        _, *problems = str(error).replace(f"cases.{case}.", "").split("\n")
-        raise BiogripError("\n".join(problems)) from error
-    return replace(study.cases[case], record=record), recording
+    sources = [*map(read_source, files)]
+    sources += (_source(setting, known, merged) for setting in asked.settings)
+    config = load(TraceConfig, merged, sources)
+    name = re.sub(r"[^A-Za-z0-9_-]", "_", asked.trace.stem)[:60]
+    name = name if re.match("[A-Za-z]", name) else f"trace_{name}"
+    return SampleCase(name, config, config, record), recording
 
 
-def _source(setting: Setting, known: set[KeyPath], merged: Mapping[str, Any], case: str) -> Source:
+def _refuse_two_protocols(asked: Asked, given: Mapping[str, Any]) -> None:
+    if len(protocols := [key for key in _PROTOCOLS if key in keys_in(given)]) > 1:
+        of_config = [*keys_in(read_configs(asked.configs))]
+        said = [".".join(key) + f" of {asked.config}" * (key in of_config) for key in protocols]
+        raise BiogripError(f"{asked.place}: found {' and '.join(said)}; allowed is one of them.")
+
+
+def _source(setting: Setting, known: set[KeyPath], merged: Mapping[str, Any]) -> Source:
     """Return the keys that a setting is to be named for: its own, and blocks that it adds."""
     path: KeyPath = setting.path
-    if path[0] == "sample":
-        path = ("cases", case, *path)
     if path[0] == "measurement" and "sphere" in merged["measurement"]:
         path = (path[0], *(_BY_SPHERE.get(str(key), key) for key in path[1:]))
     held = {"protocol": merged["protocol"]}
-    own = keys_in(held) if path in (HOLD, LOAD) else keys_in(setting.value, path)
+    keys = keys_in(held) if path in (HOLD, LOAD) else keys_in(setting.value, path)
     above = [path[:length] for length in range(1, len(path)) if path[:length] not in known]
-    return setting.by, dict.fromkeys([*above, path, *own])
+    return setting.by, dict.fromkeys([*above, path, *keys])
 
 
 def _with_instrument(
-    merged: dict[str, Any], given: Mapping[str, Any], asked: Asked
+    merged: Mapping[str, Any], given: Mapping[str, Any], asked: Asked
 ) -> tuple[dict[str, Any], Recording | None, Array | None]:
-    """Return the blocks with the trace's file, its instrument, and a protocol of that.
+    """Return the blocks with the trace's file, its instrument, and a protocol that suits it.
 
-    Where the protocol follows from the trace, it is returned, too, and what was controlled, if it
-    was recorded, see `Experiment.record`.
+    The protocol is, in this order: none that counts, of a sweep; a hold, or a recorded load, from
+    its start to the trace's end; the config's, or the gripper's usual one; a hold of 1, where what
+    is read is relative to it. Where it follows from the trace, this is returned, too, and what was
+    controlled, if it was recorded, see `Experiment.record`.
     """
-    level = merged.pop(HOLD[0], None)
-    row = "" if asked.place == TRACE else f"{asked.place}: "
-    by = next((it.by for it in asked.settings[::-1] if it.path == HOLD), f"{row}--hold")
+    blocks = {name: block for name, block in merged.items() if name != HOLD[0]}
     if not isinstance(merged["measurement"], dict):
-        return merged, None, None
+        return blocks, None, None
+    held, by = merged.get(HOLD[0]), _place_of_hold(asked)
     instrument = _instrument(merged, given)
-    axis = {"frequency": "omega_rad_per_s"} if instrument.sweeps else {"time": "time_s"}
-    usual = {**axis, instrument.read.name: instrument.read.column}
-    file = ARRAYS if asked.arrays else str(asked.trace)
-    measurement = usual | merged["measurement"] | {"file": file}
-    measurement = with_numbers(MeasurementBlock, measurement)
+    measurement = _measurement_of(asked, merged["measurement"], instrument)
     kind = given.get("instrument", instrument.kind)
+    blocks |= {"instrument": kind, "measurement": measurement}
     block = checked(MeasurementBlock, measurement)[0]
     controlled = (instrument if block is None else block.instrument).controlled
-    found = {**merged, "instrument": kind, "measurement": measurement}
-    # Load and length are filled in below, as far as they are known.
-    phase = {"duration_s": 1.0, controlled.column: 1.0}
-    held = {**found, "protocol": {"phases": [phase]}}
     if instrument.sweeps:
-        if level is not None:
+        if held is not None:
             raise BiogripError(f"{by}: is of a trace in time, not of a sweep; leave it out.")
-        return held, None, None
-    if level is None and measurement.get(LOAD[-1]) is None:
+        return _with_hold(blocks, controlled), None, None
+    if held is None and measurement.get(LOAD[-1]) is None:
         if "protocol" in given or instrument.has_jaws:
-            return found, None, None
+            return blocks, None, None
         if not instrument.relative:
             unit = f" in {controlled.unit}" if controlled.unit else ""
             raise BiogripError(
@@ -277,38 +234,71 @@ def _with_instrument(
                 "column of it by --load, or a protocol in --config."
             )
     if block is None:
-        # The study will say why.
-        return held, None, None
-    if level is not None:
-        phase[controlled.column] = controlled.in_si(*held_unit(level, controlled, by))
+        # The check of the config will say why.
+        return _with_hold(blocks, controlled), None, None
+    level = 1.0 if held is None else controlled.in_si(*held_unit(held, controlled, by))
     try:
-        own = asked.read(block)
+        recording = asked.read(block)
     except BiogripError:
         # Whoever uses the trace says what is wrong.
-        return held, None, None
-    record, start_s = None, measurement.get("start_s")
-    if own.load is not None:
-        first_s, first = own.load[0].tolist()
-        # A load that is there in the first row came before it: at 0, as one that is held.
-        if start_s is None:
-            start_s = min(first_s, 0.0) if first else first_s
-            measurement["start_s"] = start_s or None
-        record = _from(own.load, start_s)
-        largest = max(record[:, 1], key=abs)
-        if instrument.relative:
-            record[:, 1] /= largest
-        phase |= {"duration_s": float(record[-1, 0]), controlled.column: float(largest)}
-    else:
-        first = start_s or min(float(own.time_s[0]), 0.0)
-        lasts = float(own.time_s[-1]) - first
-        phase["duration_s"] = lasts if lasts > 0 else 1.0
-        if lasts > 0 and not SHORTEST_S <= lasts <= LONGEST_S:
-            raise BiogripError(
-                f"{place(own.path)}: found {lasts:g} s from the protocol's start, at {first:g} s, "
-                f"to the last reading; allowed are {SHORTEST_S:g} to {LONGEST_S:g} s. Is the unit "
-                "of time right? Or say when it started (--start)."
-            )
-    return held, own, record
+        return _with_hold(blocks, controlled, level), None, None
+    start_s = measurement.get("start_s")
+    if recording.load is None:
+        lasts_s = _duration(recording, start_s)
+        return _with_hold(blocks, controlled, level, lasts_s), recording, None
+    if start_s is None:
+        start_s = _start_of(recording.load)
+        blocks["measurement"] = measurement | {"start_s": start_s or None}
+    record = _from(recording.load, start_s)
+    largest = float(max(record[:, 1], key=abs))
+    if instrument.relative and largest:
+        record[:, 1] /= largest
+    return _with_hold(blocks, controlled, largest, float(record[-1, 0])), recording, record
+
+
+def _place_of_hold(asked: Asked) -> str:
+    """Return the option, or the cell of a table, that says what was held."""
+    row = "" if asked.place == TRACE else f"{asked.place}: "
+    said = (setting.by for setting in asked.settings[::-1] if setting.path == HOLD)
+    return next(said, f"{row}--hold")
+
+
+def _measurement_of(
+    asked: Asked, given: Mapping[str, Any], instrument: Instrument
+) -> dict[str, Any]:
+    """Return the block of the measurement, with its file and the usual names of columns."""
+    axis = {"frequency": "omega_rad_per_s"} if instrument.sweeps else {"time": "time_s"}
+    usual = {**axis, instrument.read.name: instrument.read.column}
+    file = ARRAYS if asked.arrays else str(asked.trace)
+    measurement: dict[str, Any] = with_numbers(MeasurementBlock, {**usual, **given, "file": file})
+    return measurement
+
+
+def _with_hold(
+    blocks: Mapping[str, Any], controlled: Channel, level: float = 1.0, lasts_s: float = 1.0
+) -> dict[str, Any]:
+    """Return the blocks with a protocol of one hold."""
+    phase = {"duration_s": lasts_s, controlled.column: level}
+    return {**blocks, "protocol": {"phases": [phase]}}
+
+
+def _duration(recording: Recording, start_s: float | None) -> float:
+    """Return the time from the start of what was held, by default 0, to the last reading."""
+    first_s = start_s or min(float(recording.time_s[0]), 0.0)
+    lasts_s = float(recording.time_s[-1]) - first_s
+    if lasts_s > 0 and not SHORTEST_S <= lasts_s <= LONGEST_S:
+        raise BiogripError(
+            f"{place(recording.path)}: found {lasts_s:g} s from the protocol's start, at "
+            f"{first_s:g} s, to the last reading; allowed are {SHORTEST_S:g} to {LONGEST_S:g} s. "
+            "Is the unit of time right? Or say when it started (--start)."
+        )
+    return lasts_s if lasts_s > 0 else 1.0
+
+
+def _start_of(load: Array) -> float:
+    """Return when a recorded load starts: with its first row, or before it, if it is there."""
+    first_s, first = load[0].tolist()
+    return min(first_s, 0.0) if first else first_s
 
 
 def _from(load: Array, start_s: float) -> Array:
@@ -341,6 +331,9 @@ def check_settings(traces: Sequence[Asked]) -> None:
 
     So are traces of different quantities. A `BiogripError` has the first few problems.
     """
+    for config in dict.fromkeys(file for asked in traces for file in asked.configs):
+        for note in read_config_of(TraceConfig, [config])[1]:
+            print(note, file=sys.stderr)
     read: dict[str, str] = {}
     problems: dict[str, None] = {}
     for own in traces:
@@ -356,260 +349,11 @@ def check_settings(traces: Sequence[Asked]) -> None:
         if read[key] in others:
             text = f"{own.place}: found a reading of {read[key]}, but a reading of {first} before; "
             problems[f"{text}allowed is one quantity read for all traces of a command."] = None
-    _refuse([*problems])
+    refuse_all([*problems])
 
 
-def _refuse(problems: Sequence[str]) -> None:
+def refuse_all(problems: Sequence[str]) -> None:
+    """Raise a `BiogripError` of the first few problems, if there are any."""
     more = [f"... and {len(problems) - _MOST_SHOWN} more."] if problems[_MOST_SHOWN:] else []
     if problems:
         raise BiogripError("\n".join([*problems[:_MOST_SHOWN], *more]))
-
-
-def is_table(asked: Asked) -> bool:
-    """Return True if the first line of a file is a header with a column `file`, and no trace's.
-
-    Another name of that column, as `path`, counts above the name of a file that exists.
-    """
-    with asked.trace.open("rb") as stream:
-        lines = [stream.readline(_HEAD_BYTES).decode("utf-8-sig", "replace") for _ in range(2)]
-    names, cells = (
-        [cell.strip(' "\r\n') for cell in re.split(f"[{_SEPARATORS}]", line)] for line in lines
-    )
-    if (name := _file_column(names)) is None:
-        return False
-    measured = _measured(asked.given)
-    readings = {measured[key] for key in READINGS if key in measured} or {"rotation_rad"}
-    if measured.get("time", "time_s") in names and readings & {*names}:
-        return False
-    below = dict(zip(names, cells, strict=False)).get(name)
-    exists = below and trace_file_problem(asked.trace.parent / below) is None
-    return bool(exists) or name.lower() == _FILES[0]
-
-
-def _plain(name: str) -> str:
-    return re.sub(r"[ -]+", "_", name.lower())
-
-
-def _file_column(names: Sequence[str]) -> str | None:
-    found = {_plain(name).replace("_", ""): name for name in reversed(names)}
-    return next((found[name] for name in _FILES if name in found), None)
-
-
-def _meant(name: str, cells: Sequence[str]) -> str | None:
-    """Return the option or key that a column is, but for its prefix, unit or spelling."""
-    if all(cell.lower() in {*ALIASES, *CANDIDATES} for cell in cells):
-        return "model"
-    plain = _plain(name)
-    try:
-        for cell in cells:
-            number_and_unit(cell)
-    except ValueError:
-        return next((word for word in _OF_WORDS if _misspelt(plain, word)), None)
-    blocks = read_configs([default_config()])
-    keys = [path for path in keys_in(blocks) if path[0] in _INSTRUMENT]
-    known = {str(path[-1]): dotted(path) for path in keys} | dict.fromkeys(_HELD, "hold")
-    known |= {each.controlled.column: "hold" for each in INSTRUMENTS.values()}
-    known |= {dotted(path).replace(".", "_"): dotted(path) for path in keys}
-    known |= {name: name for name in _OF_NUMBERS}
-    by_plain = {re.sub("_[^_]+$", "", key).lower(): meant for key, meant in known.items()}
-    by_plain |= {key.lower(): meant for key, meant in known.items()}
-    bare = re.sub(r"_?[(\[].*$|_[^_]+$", "", plain)
-    if plain in by_plain or by_plain.get(bare) in _OF_NUMBERS:
-        return by_plain.get(plain, by_plain.get(bare))
-    near = get_close_matches(plain, [key for key in by_plain if "_" in key], n=1, cutoff=0.9)
-    near += [key for key in _OF_NUMBERS if _misspelt(plain, key)]
-    return by_plain[near[0]] if near else None
-
-
-def _misspelt(name: str, option: str) -> bool:
-    """Return True if a name has an option's letters in another order, or nearly in theirs."""
-    close = len(name) > 3 and get_close_matches(name, [option], cutoff=0.8)
-    return bool(close) or sorted(name) == sorted(option)
-
-
-def read_table(
-    path: Path, config: Path | None = None, options: Sequence[Setting] = ()
-) -> list[Asked]:
-    """Read the traces of a table with config and options of the command; settings are not checked.
-
-    The table is text in UTF-8: `.tsv` is separated by tabs, another by what its header has. A
-    `BiogripError` has line and column of the first few problems: text that is no table, values that
-    are no YAML, a trace twice.
-    """
-    (_, header), *rows = _rows(path)
-    if (file := _file_column(header)) is None:
-        raise BiogripError(
-            f"{place(path, 1)}: found no column '{_FILES[0]}' among {listed(header)}; allowed is "
-            f"one.{nearest(_FILES[0], header)}"
-        )
-    options_of = {name: _plain(name) for name in header if _plain(name) in OPTIONS}
-    problems = list(_column_problems(path, header, rows, {file, *options_of}))
-    used = {"", *options_of, *(name for name in header if "." in name)}
-    kept = [(line, row) for line, row in rows if any(row)]
-    found: list[Asked] = []
-    set_by: list[dict[str, str]] = []
-    for line, row in kept:
-        if any(row[len(header) :]):
-            text = f"found {counted(len(row), 'cell')} in the row, allowed are the header's"
-            problems.append(f"{place(path, line)}: {text} {len(header)}.")
-        by_name = dict(zip_longest(header, row[: len(header)], fillvalue=""))
-        trace = path.parent / by_name.pop(file)
-        if trace == path.parent:
-            problems.append(f"{place(path, line, file)}: found nothing, allowed is a trace.")
-        settings = list(options)
-        set_by.append({name: cell for name, cell in by_name.items() if name in used})
-        for name, cell in set_by[-1].items():
-            where = place(path, line, name)
-            try:
-                settings += _settings_of(cell, name, options_of.get(name), where)
-            except (BiogripError, ValueError) as error:
-                problems.append(f"{where}: {error}")
-        copied = {name: cell for name, cell in by_name.items() if name not in used}
-        found.append(Asked(trace, config, tuple(settings), place(path, line), copied))
-    if not found:
-        problems.append(f"{place(path)}: found no traces, allowed is a row for each.")
-    parts, before = _parts([own.trace for own in found], set_by), dict[tuple[str, str], int]()
-    for index, (own, (line, _), part) in enumerate(zip(found, kept, parts, strict=True)):
-        first = before.setdefault((os.path.realpath(own.trace), part), line)
-        if first != line and own.trace != path.parent:
-            text = f"found '{visible(own.trace)}' again, as on line {first}; allowed is each"
-            which = "once, or a column 'reading' that tells which, as in strain=COLUMN"
-            problems.append(f"{place(path, line, file)}: {text} trace {which}.")
-        found[index] = replace(own, part=part)
-    _refuse(problems)
-    return found
-
-
-def _parts(traces: Sequence[Path], set_by: Sequence[Mapping[str, str]]) -> list[str]:
-    """Return what tells each trace from others of its file: cells of its row that differ there."""
-    differ = defaultdict[tuple[str, str], set[str]](set)
-    # Resolved, so that links to one file are found.
-    files = [os.path.realpath(trace) for trace in traces]
-    for file, cells in zip(files, set_by, strict=True):
-        for name, cell in cells.items():
-            differ[file, name].add(cell)
-    return [
-        " ".join(cell for name, cell in cells.items() if cell and len(differ[file, name]) > 1)
-        for file, cells in zip(files, set_by, strict=True)
-    ]
-
-
-def _settings_of(cell: str, name: str, option: str | None, by: str) -> Iterator[Setting]:
-    """Yield what a cell sets, in a column named after an option, or after a key with dots."""
-    if not (name and cell):
-        return
-    key = name if option is None else OPTIONS[option]
-    if isinstance(key, str):
-        yield Setting(by, tuple(key.split(".")), value_of(cell, name))
-        return
-    for part in cell.split() if option == "fix" else [cell]:
-        yield Setting(by, *key(part))
-
-
-def _rows(path: Path) -> list[tuple[int, list[str]]]:
-    """Return the cells of every row with its line, the header's first."""
-    if problem := trace_file_problem(path):
-        raise BiogripError(f"{place(path)}: {problem}")
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-        header = text.partition("\n")[0]
-        separator = "\t" if path.suffix == ".tsv" else max(_SEPARATORS, key=header.count)
-        reader = csv.reader(StringIO(text), delimiter=separator, skipinitialspace=True, strict=True)
-        if rows := [(reader.line_num, [*map(str.strip, row)]) for row in reader]:
-            return rows
-        raise ValueError("it is empty")
-    except (OSError, ValueError, csv.Error) as error:
-        raise BiogripError(f"{place(path)}: cannot be read as a table: {error}.") from error
-
-
-def _column_problems(
-    path: Path, header: Sequence[str], rows: Sequence[tuple[int, list[str]]], used: set[str]
-) -> Iterator[str]:
-    """Find names that stand twice or are those of results, and what looks like a setting."""
-    for number, name in enumerate(header):
-        cells = [cell for _, row in rows for cell in row[number : number + 1] if cell]
-        where = place(path, 1, name)
-        if name and name in header[:number]:
-            yield f"{where}: stands twice; allowed is each name once."
-        elif name not in used and (name in COLUMNS or _OF_RESULTS.fullmatch(name)):
-            yield f"{where}: is a column of the results; allowed is another name."
-        elif name and cells and "." not in name and name not in used:
-            meant = _meant(name, cells)
-            if meant and meant not in map(_plain, header):
-                yield (
-                    f"{where}: looks like a setting and is none; allowed is '{meant}' for a column "
-                    "that sets it, in SI units, or a name unlike a setting's."
-                )
-
-
-def load_in_words(trace: Trace, case: Case, given: Mapping[str, Any]) -> str:
-    """Return what was held or loaded; nothing where a config has the protocol.
-
-    Given are the blocks of the config that the user has set.
-    """
-    (recording, experiment), measured = trace, case.block.measurement
-    controlled, start_s = measured.instrument.controlled, measured.start_s or 0.0
-    if recording.load is not None and experiment.record is not None:
-        column, loads = recording.form["columns"]["load"], experiment.record[:, 1]
-        if case.instrument.relative:
-            loads = loads * getattr(case.block.protocol.phases[0], controlled.column)
-        ends = loads.min(), loads.max()
-        low, high = (plain(controlled.in_unit(end, column["unit"])) for end in ends)
-        what = _with_unit(high if low == high else f"{low} to {high}", column["unit"])
-        count = np.count_nonzero(recording.load[:, 0] >= start_s)
-        rows = f"column {column['column']}, {count:,} rows"
-        return f"Load: {what} from {start_s:g} s ({rows}){_contact(case)}."
-    if HOLD[0] not in given:
-        return ""
-    number, unit = held_unit(given[HOLD[0]], controlled)
-    start = "its start, as fitted," if experiment.fit_start else f"{start_s:g} s"
-    what = f"{_with_unit(f'{number:g}', unit)} from {start} to {recording.form['last_s']:g} s"
-    return f"Held: {what}{_contact(case)}."
-
-
-def _contact(case: Case) -> str:
-    """Return what turns a force and an indentation into a stress and a strain."""
-    sphere = case.block.measurement.sphere
-    return f", by Hertz's contact with a sphere of radius {sphere}" if sphere else ""
-
-
-def _shrinks(recording: Recording, case: Case) -> tuple[str, ...]:
-    """Return a sentence if a sphere was drawn back, where Hertz's contact has no such sum."""
-    if recording.load is None or case.block.measurement.sphere is None:
-        return ()
-    time_s, loads = recording.load[recording.load[:, 0] <= recording.form["last_s"]].T
-    most = np.maximum.accumulate(loads)
-    falls = time_s[(most > 0.1 * most[-1]) & (loads < _STAYS * most)]
-    if not len(falls):
-        return ()
-    return (
-        f"The contact shrinks from {falls[0]:g} s on: what is said holds while it grows or stays. "
-        f"Leave these readings out: --until {falls[0]:g}.",
-    )
-
-
-def _with_unit(number: str, unit: str) -> str:
-    return number if unit == "1" else f"{number} {unit}"
-
-
-def remarks_on_hold(recording: Recording, case: Case, given: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return a sentence if a sphere was drawn back, or what was held may be in another unit.
-
-    That is if readings have a unit with a prefix, and what was held is a number.
-    """
-    if shrinks := _shrinks(recording, case):
-        return shrinks
-    read, controlled = case.instrument.read, case.instrument.controlled
-    unit, held = recording.units[1], given.get(HOLD[0])
-    prefix = unit.removesuffix(read.unit)
-    if held is None or not (prefix and read.unit and controlled.unit) or prefix == unit:
-        return ()
-    number, own = held_unit(held, controlled)
-    if own != controlled.unit or str(held).rstrip().endswith(own):
-        return ()
-    likely = prefix + controlled.unit
-    likely = likely if likely in controlled.units else controlled.unit
-    return (
-        f"The {read.name} is in {unit}, but what was held, {number:g}, is taken to be in {own}: "
-        f'say its unit, as in --hold "{number:g} {likely}".',
-    )

@@ -274,7 +274,7 @@ def columns_of(found: Iterable[Mapping[str, Any]]) -> dict[str, str]:
 
 def taken_for_granted(found: Mapping[str, Any]) -> str:
     """Return a sentence naming defaults (gripper, protocol) that the user did not replace."""
-    said = [f"the default study's {name}" for name in found["by_default"]]
+    said = [f"the paper's {name}" for name in found["by_default"]]
     if "protocol" in found["by_default"]:
         phases = found["assumed"]["protocol"]["phases"]
         held = (f"{phase['duration_s']:g} s at {phase['torque_Nm']:g} N m" for phase in phases)

@@ -1,1 +1,1 @@
-"""The study's figures, each as PNG, and as PDF if asked."""
+"""Figures of traces and of cells."""

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from pathlib import Path
 from string import ascii_letters
 from typing import Any
 
@@ -17,18 +16,10 @@ from biogrip.arrays import Array
 from biogrip.digits import SUPERSCRIPTS, with_unit
 from biogrip.figures import style
 from biogrip.judging.levels import CERTAIN
-from biogrip.records.identifications import read_verdicts
-from biogrip.study.study import Case
-from biogrip.tables.cases import target_of
+from biogrip.judging.quantities import quantity_value
 
 # End of the axis of profiles, and ratio of the ends above which that of values is logarithmic.
 _HIGHEST_INCREASE, _WIDE = 12.0, 5.0
-
-
-def draw_profiles(case: Case, verdicts: Path, expected: list[Path]) -> Figure:
-    """Draw the profile of every quantity of a case, with confidence limits."""
-    others = [read_verdicts(path) for path in expected]
-    return draw_profiles_of(read_verdicts(verdicts), others, case.title, case.parameters)
 
 
 def draw_profiles_of(
@@ -51,7 +42,7 @@ def draw_profiles_of(
             (found["certainty"], ":", f"{100 * CERTAIN:g} %, to close a side"),
         ):
             axes.axhline(increase, color=style.TARGET, linestyle=look, linewidth=0.7, label=label)
-        truth = target_of(item["quantity"], truth_of or {})
+        truth = quantity_value(item["quantity"], truth_of or {})
         if truth is not None:
             axes.axvline(truth, color=style.TARGET, linewidth=0.7, label="truth")
         style.panel(axes, ascii_letters[index], item["verdict"], 40)

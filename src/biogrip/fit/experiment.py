@@ -3,14 +3,13 @@
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.fit.genome import GeneRange
 from biogrip.fit.least_squares import LeastSquaresSettings
 from biogrip.fit.problem import TraceProblem, make_problem
+from biogrip.fit.search_range import GeneRange
 from biogrip.physics.condensed import Condensed, SweptRows
 from biogrip.physics.fractional import LONGEST_S, on_clock
 from biogrip.physics.gripper import Gripper
@@ -172,16 +171,6 @@ class Experiment:
     def plain(self) -> bool:
         """True if noise is assumed to be white, and gripper and protocol to be known exactly."""
         return not (self.coloured or self.uncertain)
-
-    def calibrated(self, files: Sequence[Path]) -> "Experiment":
-        """Take the arms of the first calibration file; a bad one is a `BiogripError`."""
-        if not files:
-            return self
-        # Imported here: a recorded trace has no such file.
-        from biogrip.physics.calibration import read_calibrated_arms
-
-        gripper, uncertainty = read_calibrated_arms(files[0], self.gripper)
-        return replace(self, gripper=gripper, uncertainty={**self.uncertainty, **uncertainty})
 
     def of(
         self,

@@ -1,23 +1,13 @@
-"""The identification of one trace: its problem, its result, and the methods.
-
-Each method is a module of this package, named like the method. It has the class of its settings,
-whose fields are the keys of its config block (`biogrip.keys`), and a function
-``identify_many(problems, settings, rngs, progress)``, which returns a `Fit` of each trace, to the
-bit as if it were alone. Ranges and traces are the problems', the budget of each is in the settings,
-its generator is its only source of randomness, and progress is told of all. A method with several
-blocks is given a tuple of their settings. A history has a row for the start and one a step, of
-which there are `Fit.generations`.
-"""
+"""The identification of one trace: its problem, and its result."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from importlib import import_module
 
 import numpy as np
 
 from biogrip.arrays import Array, IntArray
-from biogrip.fit.genome import GeneRange, Genome, make_genome
 from biogrip.fit.levenberg_marquardt import Minima
+from biogrip.fit.search_range import GeneRange
 from biogrip.physics.residuals import Residuals
 from biogrip.physics.sample_model import SampleModel
 
@@ -92,98 +82,16 @@ class TraceProblem:
 
     residuals: Residuals
     """Residuals with exact derivatives, and misfits, as functions of log-parameters."""
-    genome: Genome
-    """Encoding of the parameters for the genetic algorithm."""
     low: Array
     """Logarithms of the lower ends of the search range (Table 4), (n_parameters,)."""
     high: Array
     """Those of the upper ends."""
+    ranges: tuple[GeneRange, ...]
+    """Search range of each parameter, as genes."""
 
 
 def make_problem(residuals: Residuals, ranges: Mapping[str, GeneRange]) -> TraceProblem:
-    """Set up a problem from its residuals, and gene ranges by `Parameter.range_name`."""
-    chosen = [ranges[parameter.range_name] for parameter in residuals.model.parameters]
-    return TraceProblem(
-        residuals,
-        make_genome(residuals.model, ranges),
-        np.log([genes.low for genes in chosen]),
-        np.log([genes.high for genes in chosen]),
-    )
-
-
-@dataclass(frozen=True)
-class Method:
-    """Description of an identification method, available without importing its module."""
-
-    name: str
-    """Name in the config and in files."""
-    title: str
-    """Name in print."""
-    blocks: tuple[str, ...]
-    """Names of its config blocks."""
-    step: str
-    """Name of a step of the method, after each of which its history has a row."""
-    color: str
-    """Colour of its lines in figures, its own, of `biogrip.figures.style.COLORS`."""
-    dashes: str
-    """Their dashes, as Matplotlib has them."""
-    sure: bool = False
-    """True if it finds the global optimum of (nearly) every trace; tests hold it to that."""
-
-
-METHODS: dict[str, Method] = {
-    method.name: method
-    for method in (
-        Method(
-            "genetic",
-            "genetic algorithm",
-            blocks=("genetic_algorithm",),
-            step="generation",
-            color="grey",
-            dashes="-",
-        ),
-        Method(
-            "genetic_refined",
-            "genetic, polished",
-            blocks=("genetic_algorithm", "genetic_refined"),
-            step="generation, then local fit",
-            color="vermilion",
-            dashes="-",
-            sure=True,
-        ),
-        Method(
-            "least_squares",
-            "multi-start least squares",
-            blocks=("least_squares",),
-            step="local fit",
-            color="blue",
-            dashes="--",
-            sure=True,
-        ),
-        Method(
-            "differential_evolution",
-            "differential evolution",
-            blocks=("differential_evolution",),
-            step="generation",
-            color="purple",
-            dashes="-.",
-        ),
-    )
-}
-
-Identify = Callable[[Sequence[TraceProblem], Sequence[np.random.Generator], Progress], list[Fit]]
-"""Identifies traces as the ``identify_many`` of a method does, with its settings."""
-
-
-def identifier(name: str, settings: object) -> Identify:
-    """Load a method of `METHODS` with its settings, those of several blocks as a tuple."""
-    module = import_module(f"{__package__}.{name}")
-
-    def identify(
-        problems: Sequence[TraceProblem], rngs: Sequence[np.random.Generator], progress: Progress
-    ) -> list[Fit]:
-        answers = module.identify_many(problems, settings, rngs, progress)
-        pairs = zip(problems, answers, strict=True)
-        return [answer.in_order(problem.residuals.model) for problem, answer in pairs]
-
-    return identify
+    """Set up a problem from its residuals, and search ranges by `Parameter.range_name`."""
+    chosen = tuple(ranges[parameter.range_name] for parameter in residuals.model.parameters)
+    low, high = (np.log([getattr(genes, end) for genes in chosen]) for end in ("low", "high"))
+    return TraceProblem(residuals, low, high, chosen)

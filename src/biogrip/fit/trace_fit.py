@@ -55,7 +55,7 @@ def gripper_functions(experiment: Experiment, time_s: Array, parameters: Array) 
             arm = getattr(gripper, part)
             arm = replace(arm, **{key: getattr(arm, key) + error})
             gripper = replace(gripper, **{part: arm})
-        return simulated_response(gripper, network, torque, time_s, nonlinear=False)[0]
+        return simulated_response(gripper, network, torque, time_s)[0]
 
     if not experiment.uncertain:
         return np.zeros((0, len(time_s)))

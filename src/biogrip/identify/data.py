@@ -156,9 +156,7 @@ def _fitted_along(
         return found
     time_s, measured = recording.time_s, recording.readings
     network = experiment.searched.network(np.exp(diagnosis.likelihood.best))
-    simulated = simulated_response(
-        experiment.gripper, network, experiment.torque, time_s, nonlinear=False
-    )[0]
+    simulated = simulated_response(experiment.gripper, network, experiment.torque, time_s)[0]
     added = within(experiment.nuisance(time_s), measured - simulated, experiment.sd)
     slope = float((added[-1] - added[0]) / (time_s[-1] - time_s[0]))
     if experiment.offset:

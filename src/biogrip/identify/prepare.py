@@ -21,7 +21,7 @@ from biogrip.digits import plain
 from biogrip.errors import BiogripError
 from biogrip.fit.any_sample import proportional_deviations, swept_deviations
 from biogrip.fit.experiment import Experiment
-from biogrip.fit.genome import GeneRange
+from biogrip.fit.search_range import GeneRange
 from biogrip.identify.load_noise import tare_of, without_noise
 from biogrip.identify.plausibility import check_moduli, check_recording
 from biogrip.judging import levels

@@ -124,7 +124,7 @@ def _second_branch(likelihood: Likelihood) -> Iterator[tuple[float, Array]]:
         k = np.append(network.k, [[stiffness]], axis=1)
         more = replace(network, k=k, c=np.append(network.c, [[damping]], axis=1))
         given = residuals.gripper, more, residuals.course, residuals.trace.time_s
-        return simulated_response(*given, nonlinear=False)[0]
+        return simulated_response(*given)[0]
 
     k, c = float(network.k[0, 0]), float(network.c[0, 0])
     for tau in (times * c / k for times in _TIMES):

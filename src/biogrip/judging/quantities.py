@@ -4,6 +4,7 @@ All are positive, and are represented by their logarithm as a function of the
 log-parameters.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
 
@@ -200,3 +201,9 @@ def _named(model: SampleModel, members: tuple[int, ...]) -> tuple[list[str], lis
     """Return the names and symbols of parameters, and the unit of the first."""
     chosen = [model.parameters[index] for index in members]
     return [p.name for p in chosen], [p.symbol for p in chosen], chosen[0].unit
+
+
+def quantity_value(quantity: str, parameters: Mapping[str, float]) -> float | None:
+    """Return the value of a parameter or a sum by its name, None if a parameter is not given."""
+    names = quantity.split(" + ")
+    return sum(parameters[name] for name in names) if set(names) <= set(parameters) else None

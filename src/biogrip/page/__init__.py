@@ -1,1 +1,1 @@
-"""The interactive report of a study."""
+"""Templates of pages, self-contained HTML."""

@@ -19,6 +19,9 @@ from biogrip.keys import Block, Complaint
 
 _LARGEST_QUALITY = 1e6
 
+ARM_KEYS = ("inertia_kgm2", "damping_Nms_per_rad", "stiffness_Nm_per_rad")
+"""Keys of an arm."""
+
 
 @dataclass(frozen=True)
 class Arm(Block):

@@ -199,7 +199,7 @@ class Residuals:
         if not self.instrument.has_jaws:
             return None
         network = self.model.network(np.exp(log_parameters))
-        return compute_grip(self.gripper, network, self.course, nonlinear=False)
+        return compute_grip(self.gripper, network, self.course)
 
     def ring(self, network: Network, noise_sd: float) -> Ring | None:
         """Return what noise of this size lets be seen of the arms' ringing on a sample, if any.

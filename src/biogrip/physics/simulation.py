@@ -1,11 +1,10 @@
-"""Simulated rotation of samples, and the force on them, linear or nonlinear.
+"""Simulated readings of samples, and the force of the jaws on them, by the linear model.
 
-In the nonlinear model F - F_linear = g - (c u' + k u)/b_0^2, with g the load and u the correction
-of `biogrip.physics.nonlinear`, all of second order: no large terms cancel. Targets have the arms'
-inertia, fits leave it out: after a change of the torque, arms ring for milliseconds, and later
-changes are negligible (docs/model.md, "Without inertia").
+Targets have the arms' inertia, fits leave it out: after a change of the torque, arms ring for
+milliseconds, and later changes are negligible (docs/model.md, "Without inertia").
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,32 +15,6 @@ from biogrip.physics.modes import elements_of, mode_responses
 from biogrip.physics.protocol import Course
 from biogrip.physics.response import LEFT, linear_jaw_force, step_response, superpose
 from biogrip.physics.sample_model import Network
-
-
-def jaw_force(
-    gripper: Gripper,
-    network: Network,
-    course: Course,
-    time_s: Array,
-    *,
-    nonlinear: bool,
-    inertia: bool = True,
-) -> Array:
-    """Compute the jaws' force on the sample in N, positive while they press, (n, n_times).
-
-    By either model, as in `simulated_response`; at the instant of a step: what follows it. Without
-    inertia, the force may jump.
-    """
-    force = linear_jaw_force(gripper, network, course, time_s, inertia=inertia)
-    if nonlinear:
-        from biogrip.physics.nonlinear import correction
-
-        # Arms with inertia have not moved yet at the instant of a step.
-        instants = np.nextafter(time_s, -np.inf) if inertia else time_s
-        more = correction(gripper, network, course).checked().force_at(instants)
-        force += np.where(instants < 0, 0, more)
-    return force
-
 
 # Forces below this share of the largest one are rounding errors.
 _LEAST_FORCE = 1e-9
@@ -72,14 +45,23 @@ class Grip:
         )
 
 
-def compute_grip(gripper: Gripper, network: Network, course: Course, *, nonlinear: bool) -> Grip:
+def compute_grip(gripper: Gripper, network: Network, course: Course) -> Grip:
     """Compute the extreme forces of the jaws on the first sample, without inertia."""
+
+    def force_at(time_s: Array) -> Array:
+        return linear_jaw_force(gripper, network, course, time_s, inertia=False)[0]
+
+    return extreme_forces(force_at, course)
+
+
+def extreme_forces(force_at: Callable[[Array], Array], course: Course) -> Grip:
+    """Find the extreme forces of the jaws, a function of ascending times, over a course."""
     # Dense after every change of the load.
     lengths = np.diff(course.time_s, append=course.end_s)
     count = max(3, min(_TIMES_OF_PHASE, _MOST_TIMES // len(lengths)))
     after = np.outer(lengths, np.geomspace(1e-9, 1.0, count)[:-1])
     time_s = np.unique(np.append(course.time_s[:, None] + after, course.end_s))
-    force = jaw_force(gripper, network, course, time_s, nonlinear=nonlinear, inertia=False)[0]
+    force = force_at(time_s)
     least_shown = _LEAST_FORCE * float(np.abs(force).max()) or 1.0
     shown = np.round(force / least_shown)
     most, negative = int(np.argmax(shown)), np.flatnonzero(shown < 0)
@@ -93,19 +75,11 @@ def compute_grip(gripper: Gripper, network: Network, course: Course, *, nonlinea
     )
 
 
-def simulated_response(
-    gripper: Gripper, network: Network, course: Course, time_s: Array, *, nonlinear: bool
-) -> Array:
-    """Simulate the closing rotation of the left arm in rad, with inertia, (n, n_times).
+def simulated_response(gripper: Gripper, network: Network, course: Course, time_s: Array) -> Array:
+    """Simulate what is read at ascending times, (n, n_times), with inertia, by corrected (4)-(6).
 
-    By the nonlinear model, corrected eqs. (1)-(3), which has the errors of `nonlinear_rotation`,
-    or the linear one, (4)-(6), at ascending times.
+    Of a gripper that is the closing rotation of the left arm in rad.
     """
-    if nonlinear:
-        # Imported here, as elsewhere: only a study simulates by it.
-        from biogrip.physics.nonlinear import nonlinear_rotation
-
-        return nonlinear_rotation(gripper, network, course, time_s)
     if course.deforms:
         rates, weights = elements_of(network)
     else:

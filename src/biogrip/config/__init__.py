@@ -1,0 +1,1 @@
+"""The config of a trace, checked and turned into an experiment."""

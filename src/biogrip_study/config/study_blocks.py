@@ -1,0 +1,353 @@
+"""Top-level keys of a study's config, sweeps among them, and conflicts between its parts.
+
+A sweep is a grid of cases that differ from a case of the study in two values. A point of it is a
+case of its own. Its name is made of its values, so that the random streams, which derive from it,
+stay the same when values are added.
+"""
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from itertools import product
+from typing import Annotated, Any
+
+from pydantic import BaseModel, Field, Tag
+
+from biogrip.config.design_blocks import DesignBlock
+from biogrip.config.source import overlaid
+from biogrip.config.trace_blocks import CandidateName, CaseName, ModelSelection
+from biogrip.errors import nearest
+from biogrip.keys import (
+    BY_KIND,
+    OPEN,
+    Block,
+    Complaint,
+    Distinct,
+    OneOf,
+    Printed,
+    adapter,
+    below,
+    plain,
+)
+from biogrip.physics.fractional import LONGEST_S
+from biogrip.physics.gripper import CombDrive
+from biogrip.physics.models import CANDIDATES
+from biogrip_study.config.case_blocks import OVERRIDABLE, CaseBlock, Shared
+from biogrip_study.methods.registry import METHODS
+
+MOST_POINTS = 2000
+
+_Number = Annotated[float, Field(ge=-1e12, le=1e12), Tag("a number")]
+_Text = Annotated[str, Field(max_length=60), Tag("text")]
+
+
+class ValueBlock(BaseModel):
+    """Keys to merge into the block that the axis' key names."""
+
+    model_config = OPEN
+    __pydantic_extra__: dict[str, Annotated[_Number | _Text, BY_KIND]] = Field(init=False)
+
+    label: Annotated[Printed, Field(description="Name of the value in print.")]
+
+    @property
+    def changes(self) -> dict[str, float | str]:
+        """Values by their keys."""
+        return self.__pydantic_extra__
+
+
+_Keys = Distinct[Annotated[tuple[str, ...], Field(min_length=1, max_length=100)]]
+_Value = Annotated[_Number | _Text | Annotated[ValueBlock, Tag("a block of keys")], BY_KIND]
+
+
+@dataclass(frozen=True)
+class Value:
+    """A value on an axis of a sweep's grid."""
+
+    name: str
+    """Text for case names."""
+    shown: str
+    """Text for the axis and its table; numbers in the axis' unit."""
+    overrides: dict[str, float | str]
+    """Values that replace those of the case, by dotted key."""
+
+
+@dataclass(frozen=True)
+class AxisBlock(Block):
+    """One axis of a sweep's grid: a key, or several, and its values."""
+
+    label: Printed
+    """Name in print."""
+    key: Annotated[Annotated[str, Tag("text")] | Annotated[_Keys, Tag("a list")], BY_KIND]
+    """Dotted key, or list of keys that change together, in any block that a case may change, e.g.
+    `measurement.noise.level`."""
+    values: Distinct[Annotated[tuple[_Value, ...], Field(min_length=1, max_length=16)]]
+    """Values of the key; or blocks to merge into the block of the key, each with a `label` of its
+    own."""
+    unit: Printed | None = None
+    """Unit in print."""
+    unit_in_si: Annotated[float, Field(ge=1e-24, le=1e24)] = 1.0
+    """Size of this unit in the unit of the key, by default 1."""
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Dotted keys that change together."""
+        return (self.key,) if isinstance(self.key, str) else self.key
+
+    @property
+    def title(self) -> str:
+        """Label with the unit."""
+        return self.label if self.unit is None else f"{self.label} ({self.unit})"
+
+    @property
+    def levels(self) -> tuple[Value, ...]:
+        """Values with their texts, in the order of the config."""
+        return tuple(map(self._level, self.values))
+
+    def _level(self, value: float | str | ValueBlock) -> Value:
+        if isinstance(value, ValueBlock):
+            inner = dict(sorted(value.changes.items()))
+            overrides = {f"{key}.{name}": inner[name] for key in self.keys for name in inner}
+            return Value("-".join(map(_word, inner.values())), value.label, overrides)
+        shown = value if isinstance(value, str) else f"{value / self.unit_in_si:.4g}"
+        return Value(_word(value), shown, dict.fromkeys(self.keys, value))
+
+    def complaints(self) -> Iterator[Complaint]:
+        """Refuse values of one name, and keys that no case may change."""
+        for key in self.keys:
+            if key.partition(".")[0] not in OVERRIDABLE:
+                text = f"found '{key}', allowed is a key in a block that a case may change."
+                yield ("key",), text + nearest(key, OVERRIDABLE)
+        shown = [value.shown for value in self.levels]
+        for index, value in enumerate(shown):
+            if value in shown[:index]:
+                yield ("values", index), f"is called '{value}' like one before it."
+
+
+@dataclass(frozen=True)
+class Point:
+    """A point of a sweep's grid, i.e. a case with two values changed."""
+
+    name: str
+    """Name of the point's case."""
+    case: str
+    """Case that the point's case is derived from."""
+    row: Value
+    """Value on the axis of the rows."""
+    column: Value
+    """Value on the axis of the columns."""
+
+
+@dataclass(frozen=True)
+class SweepBlock(Block):
+    """A grid of cases that differ from given cases in two values."""
+
+    cases: Distinct[Annotated[tuple[str, ...], Field(min_length=1, max_length=16)]]
+    """Cases of the study that the grid is laid over."""
+    rows: AxisBlock
+    columns: AxisBlock
+    title: Printed | None = None
+    """Name in print; by default the sweep's name."""
+
+    def points(self, name: str, case: str) -> list[Point]:
+        """Return the points of one case, row by row, of the sweep of a name."""
+        return [
+            Point(f"{case}--{name}--{row.name}--{column.name}", case, row, column)
+            for row, column in product(self.rows.levels, self.columns.levels)
+        ]
+
+    def complaints(self) -> Iterator[Complaint]:
+        """Refuse keys that both axes set."""
+        ours = {key for value in self.rows.levels for key in value.overrides}
+        for index, changing in enumerate(self.columns.levels):
+            for key in sorted(ours & changing.overrides.keys()):
+                yield ("columns", "values", index), f"sets {key}, which the rows do too."
+
+    def placed(self, point: Point, complaint: Complaint) -> Complaint:
+        """Return a complaint of a point's case as one of the value that causes it."""
+        path, text = complaint
+        key = ".".join(map(str, path))
+        for axis, value in (("rows", point.row), ("columns", point.column)):
+            if any(f"{key}.".startswith(f"{changed}.") for changed in value.overrides):
+                index = getattr(self, axis).levels.index(value)
+                return (axis, "values", index), f"gives {key}: {text}"
+        return (), f"{point.name}: gives {key}: {text}"
+
+
+def list_points(sweeps: Mapping[str, SweepBlock]) -> Iterator[tuple[str, Point]]:
+    """Yield every point of all sweeps with its sweep's name."""
+    for name, sweep in sweeps.items():
+        for case in sweep.cases:
+            for point in sweep.points(name, case):
+                yield name, point
+
+
+def point_blocks(
+    sweeps: Mapping[str, SweepBlock], cases: Mapping[str, CaseBlock]
+) -> dict[str, dict[str, Any]]:
+    """Return the config block of every point's case by name, as plain data, for checked sweeps."""
+    found = {}
+    blocks = {name: plain(case) for name, case in cases.items()} if sweeps else {}
+    for _, point in list_points(sweeps):
+        found[point.name] = blocks[point.case]
+        for key, value in (point.row.overrides | point.column.overrides).items():
+            # A key that counts takes no 8.0.
+            changed: Any = int(value) if isinstance(value, float) and value.is_integer() else value
+            for name in reversed(key.split(".")):
+                changed = {name: changed}
+            found[point.name] = overlaid(found[point.name], changed)
+    return found
+
+
+def _word(value: float | str) -> str:
+    text = value if isinstance(value, str) else f"{value:.15g}"
+    return re.sub(r"[^A-Za-z0-9-]+", "_", text)
+
+
+_MOST_CASES = 2000
+# Most names listed in a message.
+_SHOWN = 6
+_Name = Annotated[
+    str,
+    Field(
+        pattern="^[A-Za-z][A-Za-z0-9_]{0,31}$",
+        json_schema_extra={"form": "a letter, then up to 31 letters, digits or '_'"},
+    ),
+]
+
+
+@dataclass(frozen=True)
+class Evaluation(Block):
+    """Criteria by which identifications count as successful."""
+
+    optimum_tolerance: Annotated[float, Field(gt=0, le=100)]
+    """A run reaches the best encodable point of its trace if its χ² exceeds that of the point by at
+    most this. A change of one parameter by its standard deviation raises χ² by one."""
+    near_noise_tolerance: Annotated[float, Field(ge=0, le=1)]
+    """A seed counts as near the noise if its misfit exceeds the RMS of the noise in its trace by at
+    most this share. With thousands of samples that is a large increase of χ², so the fit need not
+    be an optimum."""
+
+
+@dataclass(frozen=True)
+class ReadingBlock(Block):
+    """An interpretation of what the paper leaves open: changes to every simulated case."""
+
+    title: Printed
+    """Name in print."""
+    changes: Mapping[str, Any]
+    """Merged into each case, with keys of a case, e.g. `genetic_algorithm: {patience: 60}`."""
+    runs: Annotated[int, Field(ge=1, le=100)] = 1
+    """Number of runs on a trace, the best of which is shown."""
+    polished: bool = False
+    """A local fit follows the algorithm."""
+
+
+@dataclass(frozen=True)
+class TracesBlock(Block):
+    """A table of recorded traces, which are identified in batches of rows."""
+
+    table: Annotated[str, Field(min_length=1, max_length=4000)]
+    """The table, a row a trace; relative to where Snakemake runs."""
+    config: Annotated[str | None, Field(min_length=1, max_length=4000)] = None
+    """Config of the traces, as `biogrip identify --config` takes it: gripper, protocol, ... By
+    default that of every trace."""
+    model: CandidateName = "generalized_maxwell"
+    """Sample model of all traces; a column `sample.model` goes before it."""
+    rows_a_batch: Annotated[int, Field(ge=1, le=100_000)] = 100
+    """Number of rows per job. Changes no result."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class StudyConfig(Shared):
+    """All keys of a study's config."""
+
+    study_seed: Annotated[int, Field(ge=0, le=2**64 - 1)]
+    """The one seed of the study. Noise and genetic algorithm draw from streams derived from it, the
+    case's name and the seed's number."""
+    seeds: Annotated[int, Field(ge=1, le=1_000_000)]
+    """Number of noisy traces of each case that are made and identified. Raising it keeps the
+    batches that are full."""
+    batch_size: Annotated[int, Field(ge=1, le=100_000)] = 500
+    """Number of seeds per job, by default 500. Changes no result, only how much of a job is
+    start-up."""
+    pdf: bool = False
+    """Whether figures are also written as PDF. Changes no result."""
+    actuator: CombDrive
+    """The rotary comb drive (Table 2)."""
+    methods: Distinct[
+        Annotated[tuple[Annotated[str, OneOf(METHODS)], ...], Field(min_length=1, max_length=100)]
+    ]
+    """Identification methods applied to every trace. Tables 5-7 and figures of single fits show the
+    first."""
+    model_selection: ModelSelection
+    evaluation: Evaluation
+    reconstructed: Annotated[tuple[str, ...], Field(max_length=1000)]
+    """Keys, or whole blocks, whose values the paper does not give. Tables mark them."""
+    cases: Annotated[
+        Mapping[CaseName, CaseBlock],
+        Field(
+            max_length=_MOST_CASES,
+            description=f"The samples of the study, by name, at most {_MOST_CASES}. Any of the "
+            f"blocks {', '.join(OVERRIDABLE)} may be given in a case, too; its keys then hold for "
+            "this case alone.",
+        ),
+    ]
+    traces: TracesBlock | None = None
+    """A table of recorded traces, which are identified in batches beside the cases, as `biogrip
+    identify` does."""
+    only: Distinct[Annotated[tuple[str, ...], Field(min_length=1, max_length=_MOST_CASES)]] = ()
+    """Names of the cases to run; the others are left out. By default all under `cases`."""
+    design: DesignBlock = field(default_factory=DesignBlock)
+    sweeps: Annotated[
+        Mapping[_Name, SweepBlock],
+        Field(
+            description=f"Grids of cases for heat maps, by name, of at most {MOST_POINTS} points "
+            "together. Every point is a case that differs in two values; it is identified like "
+            "others, and shown in heat maps and their table only."
+        ),
+    ] = field(default_factory=dict)
+    readings: Annotated[Mapping[_Name, ReadingBlock], Field(max_length=100)] = field(
+        default_factory=dict
+    )
+    """Interpretations of the paper's text, by name, each tried with the genetic algorithm on the
+    noisy traces of every simulated case, for a table."""
+
+    def complaints(self) -> Iterator[Complaint]:
+        """Find too many jobs, samples that do not fit, and names of nothing that there is."""
+        if not self.cases:
+            yield ("cases",), "found none, allowed is one or more."
+        simulated = (case for case in self.cases.values() if not case.recorded)
+        longest = max((case.protocol.end_s for case in simulated), default=0.0)
+        for index, name in enumerate(self.model_selection.models):
+            if CANDIDATES[name].model.power_law and longest > LONGEST_S:
+                text = f"found {name} and a protocol of {longest:g} s, allowed are at most"
+                yield ("model_selection", "models", index), f"{text} {LONGEST_S:g} s with it."
+        for name, case in self.cases.items():
+            yield from below(("cases", name), case.comb_complaints(self.actuator))
+        known = adapter(StudyConfig).dump_python([self])[0] if self.reconstructed else {}
+        for index, key in enumerate(self.reconstructed):
+            block: Any = known
+            for part in key.split("."):
+                block = block.get(part) if isinstance(block, Mapping) else None
+            if block is None:
+                yield ("reconstructed", index), f"found '{key}', allowed is a key of this study."
+        chosen = [name for name in self.cases if name in (self.only or self.cases)]
+        points, taken = [*list_points(self.sweeps)], {*chosen}
+        if len(points) > MOST_POINTS:
+            yield ("sweeps",), f"found {len(points)} points, allowed are {MOST_POINTS} together."
+        for sweep, point in points:
+            if point.name in taken:
+                text = f"has the point {point.name}, a name that there is already"
+                yield ("sweeps", sweep), f"{text}; allowed is another."
+            taken.add(point.name)
+        searched = [p.name for case in self.cases.values() for p in case.searched]
+        lists: dict[tuple[str, ...], tuple[Iterable[str], Iterable[str]]] = {
+            ("design", "parameters"): (self.design.parameters, dict.fromkeys(searched)),
+            ("only",): (self.only, self.cases),
+            **{("sweeps", name, "cases"): (s.cases, chosen) for name, s in self.sweeps.items()},
+        }
+        for path, (found, allowed) in lists.items():
+            for index, name in enumerate(found):
+                if name not in allowed:
+                    text = f"found '{name}', allowed are {', '.join([*allowed][:_SHOWN])}."
+                    yield (*path, index), text + nearest(name, allowed)

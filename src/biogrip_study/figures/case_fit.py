@@ -1,0 +1,148 @@
+"""Figures 9, 11 and 12: target, noisy trace, fits, and the residuals; and the force of the jaws."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from biogrip.arrays import Array
+from biogrip.figures import style
+from biogrip.figures.fit import Fit, draw_fit, fit_of, scale_of
+from biogrip.fit.experiment import Experiment
+from biogrip_study.config.study import Case
+from biogrip_study.gripper.simulation import jaw_force
+from biogrip_study.gripper.unilateral import UnilateralResponse, unilateral_response
+from biogrip_study.records.identifications import ALL, basins, read_identifications, read_verdicts
+from biogrip_study.records.rows import seeds_of
+from biogrip_study.records.traces import Measurements, read_measurements, read_target
+from biogrip_study.stages.identification import experiment_for
+from biogrip_study.stages.judgement import TRACE
+
+SHOWN_SEEDS = 100
+"""Most seeds drawn individually; figures show the first ones."""
+
+
+def first_of_basins(found: pd.DataFrame, case: Case) -> dict[str, pd.Series]:
+    """Return the first run of each of the `basins`, by what it is called in a legend."""
+    if len(found) == 1:
+        return {"the only trace": found.iloc[0]}
+    return {
+        f"seed {runs['seed'].iloc[0]}" + f", {name}" * (name != ALL): runs.iloc[0]
+        for name, runs in basins(found, case.study.near_noise_tolerance).items()
+    }
+
+
+def fits_of_basins(
+    case: Case, identifications: Path, measurements: list[Path], calibrated: list[Path]
+) -> dict[str, Fit]:
+    """Return the fit of the first run of each basin, by label, from files of a case."""
+    found = read_identifications(identifications, case, case.study.shown_method.name)
+    fits = {}
+    for words, run in first_of_basins(found, case).items():
+        seed = int(run["seed"])
+        values = {p.name: float(run[p.column]) for p in case.sample.model.parameters}
+        holding = next(path for path in measurements if seed in seeds_of(path.stem))
+        recorded = read_measurements(holding, [seed])
+        experiment = experiment_for(case.experiment, recorded, calibrated)
+        fits[f"fit ({words})"] = _fit_of_seed(experiment, values, recorded, seed)
+    return fits
+
+
+def _fit_of_seed(
+    problem: Experiment, parameters: Mapping[str, float], made: Measurements, seed: int
+) -> Fit:
+    return fit_of(problem, parameters, made.time_s, made.readings[seed], made.sd, made.target)
+
+
+def first_seeds(found: pd.DataFrame) -> pd.DataFrame:
+    """Return the identifications of seeds that are drawn individually."""
+    return found[found["seed"] < SHOWN_SEEDS]
+
+
+def seeds_in_words(count: int) -> str:
+    """Return in words how many seeds are drawn individually."""
+    if count == 1:
+        return "the only trace"
+    return f"all {count} seeds" if count <= SHOWN_SEEDS else f"first {SHOWN_SEEDS} of {count} seeds"
+
+
+def draw_fits(
+    case: Case, identifications: Path, measurements: list[Path], calibrated: list[Path]
+) -> Figure:
+    """Draw the fit of the first run in each basin, beside the trace of the first of these."""
+    fits = fits_of_basins(case, identifications, measurements, calibrated)
+    return draw_fit(fits, case.title, case.published.axis_rad)
+
+
+def draw_judged_fit(
+    case: Case, verdicts: Path, measurements: list[Path], calibrated: list[Path]
+) -> Figure:
+    """Draw the judged trace of a case and its best fit."""
+    fit = judged_fit(case, read_verdicts(verdicts), measurements[0], calibrated)
+    trace = "recorded trace" if case.recorded else f"seed {TRACE}"
+    return draw_fit({f"best fit ({trace})": fit}, case.title, case.published.axis_rad)
+
+
+def judged_fit(
+    case: Case, verdicts: Mapping[str, Any], measurements: Path, calibrated: list[Path]
+) -> Fit:
+    """Return the judged trace of a case and its best fit."""
+    recorded = read_measurements(measurements, [TRACE])
+    experiment = experiment_for(case.experiment, recorded, calibrated)
+    found = {item["quantity"]: item["value"] for item in verdicts["quantities"]}
+    return _fit_of_seed(experiment, found, recorded, TRACE)
+
+
+def draw_force(case: Case, target: Path) -> Figure:
+    """Draw the jaw force under bilateral contact, and the rotation with and without adhesion."""
+    time_s, _, rotation = read_target(target, case.times_s)
+    device = case.gripper, case.network, case.torque
+    # Without inertia, since the jaws ring for less than a sampling interval after a step.
+    sticking = jaw_force(*device, time_s, nonlinear=case.nonlinear_target, inertia=False)[0]
+    drawn = style.figure(style.COLUMN_IN, 3.2)
+    forces, rotations = drawn.subplots(2, 1, sharex=True, height_ratios=[1.25, 1])
+    factor, unit = scale_of(sticking, "N")
+    forces.axhline(0, color=style.BLACK, linewidth=0.6)
+    forces.plot(time_s, factor * sticking, color=style.BLUE, label="jaws that hold the sample")
+    negative = np.minimum(factor * sticking, 0)
+    pulling = bool(negative.min() < -1e-9 * factor * np.abs(sticking).max())
+    if pulling:
+        forces.fill_between(
+            time_s, negative, 0, color=style.ORANGE, alpha=0.35, linewidth=0, hatch="////",
+            label="the jaws would have to pull",
+        )  # fmt: skip
+    apart = None
+    if pulling and not case.nonlinear_target:
+        apart = unilateral_response(*device, time_s)
+        shown = _from_loss(apart, apart.jaw_force_N)
+        forces.plot(time_s, factor * shown, "--", color=style.ORANGE, label="jaws that let go")
+    forces.set_ylabel(f"jaw force ({unit})")
+    low, high = float(negative.min()), factor * float(sticking.max())
+    forces.set_ylim(low - 0.08 * (high - low), high + (0.62 if apart else 0.42) * (high - low))
+    forces.legend(loc="upper right")
+    forces.set_title(case.title)
+
+    factor, unit = scale_of(rotation, "rad")
+    name = "target" + (", jaws that let go" if case.unilateral else "")
+    rotations.plot(time_s, factor * rotation, color=style.BLACK, label=name)
+    if apart and not case.unilateral:
+        shown = _from_loss(apart, apart.rotation[0])
+        rotations.plot(time_s, factor * shown, "--", color=style.ORANGE, label="jaws that let go")
+    rotations.set_ylabel(f"rotation ({unit})")
+    low, high = (factor * float(end) for end in (min(rotation.min(), 0), rotation.max()))
+    rotations.set_ylim(low, high + 0.4 * (high - low))
+    rotations.set_xlabel("time (s)")
+    rotations.set_xlim(time_s[0], time_s[-1])
+    rotations.legend(loc="upper right", ncols=2)
+    drawn.align_ylabels()
+    return drawn
+
+
+def _from_loss(found: UnilateralResponse, values: Array) -> Array:
+    """Return values from the last sample before contact is first lost, NaN before."""
+    lost = np.flatnonzero(~found.touching)
+    start = max(lost[0] - 1, 0) if len(lost) else len(values)
+    return np.where(np.arange(len(values)) >= start, values, np.nan)

@@ -1,0 +1,387 @@
+"""Figures of a study: fits and identifications about the truth, moduli, its answer at a glance.
+
+Of a sweep, heat maps of the share of seeds in the true basin, and of their errors over the bound.
+"""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LogNorm, Normalize
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+
+from biogrip.arrays import Array
+from biogrip.digits import with_unit
+from biogrip.figures import style
+from biogrip.figures.fit import draw_traces
+from biogrip.figures.likelihood import draw_profile
+from biogrip.judging.verdicts import BOUNDED_ABOVE
+from biogrip.physics.noise import standard_deviation
+from biogrip.physics.sample_model import Network, SampleModel, complex_modulus
+from biogrip_study.config.study import Case, Study
+from biogrip_study.config.study_blocks import SweepBlock
+from biogrip_study.figures.case_fit import (
+    SHOWN_SEEDS,
+    first_seeds,
+    fits_of_basins,
+    judged_fit,
+    seeds_in_words,
+)
+from biogrip_study.methods.registry import METHODS
+from biogrip_study.records.identifications import (
+    near_noise,
+    near_noise_words,
+    read_identifications,
+    read_verdicts,
+)
+from biogrip_study.records.traces import read_target
+from biogrip_study.tables.sweeps import axis_title, headlines_of, read_points
+
+# Ends of the axes of identified over target values, of parameters in decades and of sums.
+_WORST, _SUM = 1e3, 0.1
+_TITLE_LETTERS = 19
+_MOST_CASES = 3
+_DOTS: dict[str, Any] = {
+    "linestyle": "", "marker": "o", "markersize": 2.2, "markeredgewidth": 0, "alpha": 0.55
+}  # fmt: skip
+
+
+def shown_cases(study: Study) -> list[str]:
+    """Return names of the first simulated cases, as many as fit."""
+    return study.simulated[:_MOST_CASES]
+
+
+def draw_overview(
+    study: Study,
+    identifications: list[Path],
+    expected: list[Path],
+    measurements: list[Path],
+    calibrated: list[Path],
+) -> Figure:
+    """Draw a fit of each basin of the first case, and identified over target values of some."""
+    cases = list(study.cases.values())
+    drawn = style.figure(style.PAGE_IN, 3.0)
+    axes = drawn.subplots(1, 1 + len(cases), width_ratios=[2] + [1.05] * len(cases))
+    fits = fits_of_basins(cases[0], identifications[0], measurements, calibrated)
+    factor, _ = draw_traces(axes[0], fits)
+    fit = next(iter(fits.values()))
+    axes[0].set_ylim(top=1.65 * factor * fit.measured.max())
+    axes[0].set(xlim=(fit.time_s[0], fit.time_s[-1]), xlabel="time (s)")
+    axes[0].legend(loc="upper right")
+    style.panel(axes[0], "a", cases[0].title)
+    files = zip(axes[1:], cases, identifications, expected, strict=True)
+    for index, (scatter, case, path, judged) in enumerate(files):
+        found = read_identifications(path, case, study.shown_method.name)
+        quantities = read_verdicts(judged)["quantities"]
+        bounded = {it["quantity"] for it in quantities if it["verdict"] != BOUNDED_ABOVE}
+        _scatter(scatter, case, first_seeds(found), bounded)
+        scatter.set_yticks([1e-3, 1e-2, 0.1, 1, 10, 100, 1e3], [""] * 7 if index else None)
+        style.panel(scatter, "bcd"[index], case.title, most_letters=_TITLE_LETTERS)
+    axes[1].set_ylabel("identified / target")
+    pairs = (zip(*it.get_legend_handles_labels(), strict=True) for it in axes[1:])
+    legend = {label: handle for pair in pairs for handle, label in pair}
+    drawn.legend(
+        legend.values(),
+        legend.keys(),
+        loc="outside lower right",
+        ncols=5,
+        markerscale=2.5,
+        title=seeds_in_words(len(found)) if len(found) > SHOWN_SEEDS else None,
+    )
+    return drawn
+
+
+def _scatter(axes: Axes, case: Case, found: pd.DataFrame, bounded: set[str]) -> None:
+    reached = near_noise(found, tolerance := case.study.near_noise_tolerance)
+    identified = case.published.identified
+    ticks: list[str] = []
+    # Sums are told so much better that on an axis of decades they are a line.
+    sums = axes.twinx()
+    sums.set(ylim=(1 - _SUM, 1 + _SUM))
+    for group in case.sample.model.quantities:
+        names = [parameter.name for parameter in group]
+        target = sum(case.parameters[name] for name in names)
+        if target <= 0 or " + ".join(names) not in bounded:
+            continue
+        x = len(ticks)
+        ticks.append("+".join(parameter.symbol for parameter in group))
+        ratio = found[[parameter.column for parameter in group]].sum(axis=1).to_numpy(float)
+        place = x + 0.5 * ((np.arange(len(ratio)) * 0.618034) % 1 - 0.5)
+        points = np.column_stack([place, ratio / target])
+        own, ends = (
+            (axes, (1 / _WORST, _WORST)) if len(group) == 1 else (sums, (1 - _SUM, 1 + _SUM))
+        )
+        for which, color, label in (
+            (~reached, style.ALL_SEEDS, "other fits"),
+            (reached, style.FITTED, f"fit {near_noise_words(tolerance)}"),
+        ):
+            look, labels = _DOTS | {"color": color}, (label, "")
+            low, high = ((sign * np.inf, end) for sign, end in zip((-1, 1), ends, strict=True))
+            style.points_within(own, points[which], low, high, look, edge_size=3.5, labels=labels)
+        if set(names) <= set(identified):
+            paper = sum(identified[name] for name in names) / target
+            shown = float(np.clip(paper, *ends))
+            own.plot([x - 0.4, x + 0.4], [shown, shown], color=style.PAPER, label="paper")
+    axes.axhline(1, color=style.TARGET, linewidth=0.8, label="truth")
+    axes.set_yscale("log")
+    axes.plot([], [], "^", color=style.TARGET, markersize=1.6, label="beyond the axis")
+    axes.set_ylim(1 / (2 * _WORST), 2 * _WORST)
+    axes.set_xticks(range(len(ticks)), ticks)
+    sums.spines["right"].set_visible(True)
+    sums.set_yticks([1 - _SUM, 1, 1 + _SUM], [f"{1 - _SUM:g}", "1", f"{1 + _SUM:g}"])
+    if len(ticks) > 1:
+        axes.axvline(len(ticks) - 1.5, color=style.TARGET, linewidth=0.5)
+
+
+def draw_answer(case: Case, verdicts: Path, measurements: Path, calibrated: list[Path]) -> Figure:
+    """Draw a gripper, the judged trace of a case, and what it tells of two exchangeable dampers."""
+    found = read_verdicts(verdicts)
+    items = {item["quantity"]: item for item in found["quantities"]}
+    drawn = style.figure(style.COLUMN_IN, 3.4)
+    (device, trace), profiles = drawn.subplots(2, 2)
+    _device(device)
+    style.panel(device, "1", "two arms squeeze")
+    fit = judged_fit(case, found, measurements, calibrated)
+    factor, unit = draw_traces(trace, {"fit": fit})
+    trace.set_ylim(top=1.45 * factor * fit.measured.max())
+    trace.set(xlabel="time (s)", ylabel=with_unit("rotation", unit))
+    handles, _ = trace.get_legend_handles_labels()
+    trace.legend(handles[::2], ["trace", "fit"], loc="upper right", ncols=2, columnspacing=1)
+    style.panel(trace, "2", "one of them turns")
+    names = [name for name in case.sample.model.names if name in case.sample.model.exchangeable]
+    for number, axes, name in zip("34", profiles, (" + ".join(names), names[1]), strict=True):
+        draw_profile(axes, items[name])
+        axes.axhline(found["threshold"], color=style.BLACK, linestyle="--", linewidth=0.7)
+        place = (0.02, found["threshold"] + 0.2, f"{100 * found['confidence']:g} %")
+        axes.text(*place, transform=axes.get_yaxis_transform(), fontsize=7)
+        style.panel(axes, number, f"{items[name]['symbol']}: {items[name]['verdict']}")
+    profiles[0].set_ylabel("rise of χ²")
+    return drawn
+
+
+def _device(axes: Axes) -> None:
+    axes.add_patch(Circle((0, 3.0), 0.34, color=style.ORANGE))
+    for side in (-1, 1):
+        axes.plot([side * 1.2, side * 0.32], [0, 3.1], color=style.BLUE, linewidth=4)
+        axes.plot(side * 1.2, 0, "o", color="white", markeredgecolor=style.BLACK, markersize=6)
+        arrow = {"arrowstyle": "->", "lw": 1.0, "color": style.BLACK}
+        axes.annotate("", (side * 0.65, 1.5), (side * 1.5, 1.5), arrowprops=arrow)
+    axes.annotate("torque", (0, 1.5), ha="center", va="center", fontsize=7)
+    axes.set(xlim=(-1.8, 1.8), ylim=(-0.3, 3.5), aspect="equal")
+    axes.set_axis_off()
+
+
+NEAR = 0.1
+"""Relative spread of nine tenths of the fits below which the experiment determines a modulus."""
+
+_POINTS = 121
+_PANEL_LETTERS = 28
+_STYLES: tuple[dict[str, Any], ...] = (
+    *({"color": colour} for colour in (style.BLUE, style.ORANGE, style.GREEN)),
+    *(
+        {"color": colour, "linestyle": (0, (2, 2))}
+        for colour in (style.PURPLE, style.SKY, style.GREY)
+    ),
+)
+
+
+def draw_moduli(study: Study, identifications: list[Path], targets: list[Path]) -> Figure:
+    """Draw moduli over frequency, and sensitivities over time."""
+    drawn = style.figure(style.PAGE_IN, 4.4)
+    axes = drawn.subplots(2, len(study.cases), squeeze=False, height_ratios=[1.35, 1])
+    files = zip(study.cases.values(), identifications, targets, strict=True)
+    for column, (case, identified, target) in enumerate(files):
+        time_s, _, rotation = read_target(target, case.times_s)
+        logs = case.experiment.logs(case.parameters)
+        _, sensitivity = case.experiment.of(time_s, rotation).residuals(logs)
+        sigma = standard_deviation(rotation, case.noise)
+        # Without noise there is nothing to compare with: NaN.
+        relative = sensitivity / np.where(sigma > 0, sigma, np.nan)
+        _moduli(axes[0, column], study, case, identified, time_s)
+        _sensitivities(axes[1, column], case.experiment.searched, time_s, relative)
+        style.panel(axes[0, column], "abc"[column], case.title, _PANEL_LETTERS)
+        style.panel(axes[1, column], "def"[column], "when each parameter shows", _PANEL_LETTERS)
+    units = [case.experiment.model.stiffness_unit for case in study.cases.values()]
+    for column, unit in enumerate(units):
+        if column == 0 or unit != units[column - 1]:
+            kind = "stiffness" if unit == "N/m" else "modulus"
+            axes[0, column].set_ylabel(f"{kind} ({unit})")
+    axes[1, 0].set_ylabel("sensitivity / noise")
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    drawn.legend(handles, labels, loc="outside upper center", ncols=len(labels))
+    return drawn
+
+
+def _moduli(axes: Axes, study: Study, case: Case, identified: Path, time_s: Array) -> None:
+    """Draw G' and G'' of all fits and of the truth, and shade where the fits agree."""
+    between = np.diff(time_s)
+    slowest, fastest = 1 / (time_s[-1] - time_s[0]), 1 / float(np.min(between))
+    omega = np.geomspace(slowest / 30, 30 * fastest, _POINTS)
+    model = case.experiment.model
+    near = []
+    for method in {m.name: m for m in (study.shown_method, study.fitting_method)}.values():
+        found = first_seeds(read_identifications(identified, case, method.name))
+        fits = found[[p.column for p in model.parameters]].to_numpy(float)
+        moduli = _modulus(model.network(fits), omega)
+        near.append(moduli[near_noise(found, study.near_noise_tolerance)])
+        color = style.COLORS[method.color]
+        look: dict[str, Any] = {"color": color, "linewidth": 0.4, "alpha": 0.45}
+        for index, modulus in enumerate(moduli):
+            label = method.title if index == 0 else None
+            for part, dashed in ((modulus.real, "-"), (modulus.imag, "--")):
+                axes.plot(omega, part, dashed, label=label, **look)
+                label = None
+    fitting = np.concatenate(near)
+    # In the upper half and, hatched, in the lower one.
+    for part, above, name in ((fitting.real, 0.5, "storage"), (fitting.imag, 0.0, "loss")):
+        ends: dict[str, Any] = {"ymin": above, "ymax": above + 0.5, "linewidth": 0, "zorder": 0}
+        hatched = {"fill": False, "edgecolor": style.SHADE, "hatch": "////"}
+        ends |= {"color": style.SHADE} if above else hatched
+        shown = np.array([], dtype=np.int64)
+        if len(part):
+            # Where nine tenths of the fits agree.
+            least, most = np.quantile(part, (0.05, 0.95), axis=0)
+            shown = np.flatnonzero(most < (1 + NEAR) * least)
+        for run in np.split(shown, np.flatnonzero(np.diff(shown) > 1) + 1) if len(shown) else []:
+            label = f"{name} seen" if run[0] == shown[0] else None
+            axes.axvspan(omega[run[0]], omega[run[-1]], label=label, **ends)
+    truth = _modulus(model.sample(case.parameters), omega)[0]
+    axes.plot(omega, truth.real, color=style.BLACK, label="truth, storage")
+    axes.plot(omega, truth.imag, "--", color=style.BLACK, label="truth, loss")
+    axes.set(xscale="log", yscale="log")
+    largest = float(np.max(np.abs(truth)))
+    axes.set_ylim(1e-5 * largest, 5 * largest)
+    axes.set_xlim(omega[0], omega[-1])
+    axes.set_xlabel("angular frequency (rad/s)")
+
+
+def _sensitivities(axes: Axes, model: SampleModel, time_s: Array, relative: Array) -> None:
+    # Decreasing widths and dashes keep coinciding curves visible.
+    widths = np.linspace(2.2, 1.0, len(model.parameters))
+    for parameter, row, look, width in zip(
+        model.parameters, relative, _STYLES, widths, strict=False
+    ):
+        axes.plot(time_s, row, linewidth=width, label=parameter.symbol, **look)
+    axes.axhspan(-1, 1, color=style.SHADE, linewidth=0, zorder=0)
+    axes.set(xlim=(time_s[0], time_s[-1]), xlabel="time (s)")
+    if not np.any(np.isfinite(relative)):
+        axes.text(0.5, 0.5, "no noise", ha="center", transform=axes.transAxes)
+    axes.legend(ncols=2, columnspacing=0.8, handlelength=1)
+
+
+def _modulus(network: Network, omega: Array) -> Array:
+    """Return complex moduli of n samples, in N/m or Pa, (n, n_omega)."""
+    storage, loss = complex_modulus(network, omega)
+    return storage + 1j * loss
+
+
+_CELL_IN = 0.24
+_TALLEST_IN = 2.4
+# Smallest cell that holds two lines of text.
+_LEGIBLE_IN = (0.26, 0.2)
+_SHARE = Normalize(0, 100)
+_RATIO = LogNorm(0.5, 100)
+_RATIO_TICKS = (0.5, 1, 2, 5, 10, 20, 50, 100)
+_WITHOUT_BOUND = "#dddddd"
+
+
+def save_robustness(study: Study, sweep: str, points: Path, figure: list[Path]) -> None:
+    """Draw a sweep, see `draw_robustness`, and write the figure."""
+    with style.styled():
+        style.save(draw_robustness(study, sweep, points), *figure)
+
+
+def draw_robustness(study: Study, name: str, points: Path) -> Figure:
+    """Draw shares in the true basin, and errors of the best and the worst determined quantity.
+
+    Numbers in cells are for the first method; brackets hold the share of the second method, and
+    the bound.
+    """
+    sweep, methods = study.config.sweeps[name], study.config.methods
+    cases = list(sweep.cases)[:_MOST_CASES]
+    rows = len(sweep.rows.levels)
+    height = min(max(_CELL_IN * rows, 0.9), _TALLEST_IN)
+    drawn = style.figure(style.PAGE_IN, 3 * (height + 0.25) + 0.9)
+    grid = drawn.subplots(3, len(cases), squeeze=False, sharex=True, sharey=True)
+    for index, case in enumerate(cases):
+        found = read_points(points, name, case)
+        style.panel(grid[0, index], "abc"[index], study.cases[case].title, most_letters=24)
+        first, *others = (found[found["method"] == method] for method in methods[:2])
+        shares = [100 * _grid(sweep, each, "basin_share") for each in (first, *others)]
+        _heat_map(grid[0, index], sweep, shares[0], _SHARE, "cividis")
+        _write(grid[0, index], shares, _SHARE(shares[0]), "cividis", height / rows)
+        chosen = headlines_of(found)
+        for axes, quantity in zip(grid[1:, index], chosen, strict=False):
+            symbol = re.sub(r"_(\w+)", r"_{\1}", quantity)
+            axes.set_title(f"${symbol}$: error there (bound) in %", fontsize=7.5)
+            own = first[first["quantity"] == quantity]
+            error, bound = (_grid(sweep, own, f"{it}_percent") for it in ("basin_error", "bound"))
+            # Clip, since an error of zero has no logarithm.
+            ratio = np.clip(error / bound, _RATIO.vmin, _RATIO.vmax)
+            _heat_map(axes, sweep, ratio, _RATIO, "cividis_r")
+            _write(axes, [error, bound], _RATIO(ratio), "cividis_r", height / rows)
+        for axes in grid[1 + len(chosen) :, index]:
+            axes.set_axis_off()
+            words = "nothing else is determined\nat half of the points"
+            axes.text(0.5, 0.5, words, ha="center", transform=axes.transAxes)
+    drawn.supylabel(axis_title(study, sweep.rows), fontsize=8)
+    drawn.supxlabel(axis_title(study, sweep.columns), fontsize=8)
+    title, *titles = (METHODS[method].title for method in methods)
+    bar = drawn.colorbar(ScalarMappable(_SHARE, "cividis"), ax=list(grid[0]), pad=0.01)
+    lines = ["seeds in the true basin (%)", title, *(f"({other})" for other in titles[:1])]
+    bar.set_label("\n".join(lines), fontsize=7)
+    bar = drawn.colorbar(
+        ScalarMappable(_RATIO, "cividis_r"), ax=list(grid[1:].flat), pad=0.01, extend="both"
+    )
+    bar.set_ticks(_RATIO_TICKS, labels=[f"{tick:g}" for tick in _RATIO_TICKS])
+    bar.set_label(f"median error there / bound\n{title}", fontsize=7)
+    drawn.suptitle(sweep.title or name, fontsize=8, x=0.01, ha="left")
+    return drawn
+
+
+def _grid(sweep: SweepBlock, points: pd.DataFrame, column: str) -> Array:
+    wide = points.pivot_table(index="row", columns="column", values=column, dropna=False)
+    rows, columns = ([level.shown for level in axis.levels] for axis in (sweep.rows, sweep.columns))
+    return wide.reindex(index=rows, columns=columns).to_numpy(float)
+
+
+def _heat_map(axes: Axes, sweep: SweepBlock, values: Array, norm: Normalize, colours: str) -> None:
+    axes.set_facecolor(_WITHOUT_BOUND)
+    axes.pcolormesh(values, norm=norm, cmap=colours, edgecolors="white", linewidth=0.5)
+    for axis, set_ticks in ((sweep.rows, axes.set_yticks), (sweep.columns, axes.set_xticks)):
+        shown = [level.shown.replace(", ", ",\n") for level in axis.levels]
+        set_ticks(np.arange(len(shown)) + 0.5, shown)
+    axes.tick_params(length=0, labelsize=6.5)
+    for spine in axes.spines.values():
+        spine.set_visible(False)
+
+
+def _write(axes: Axes, numbers: list[Array], colour: Array, colours: str, height_in: float) -> None:
+    """Write a number into every cell, and a second one in brackets below it."""
+    columns = numbers[0].shape[1]
+    if style.PAGE_IN / (_MOST_CASES + 1) / columns < _LEGIBLE_IN[0] or height_in < _LEGIBLE_IN[1]:
+        return
+    dark = colours == "cividis"
+    for (row, column), share in np.ndenumerate(colour):
+        light = share < 0.5 if dark else share > 0.5
+        texts = [_short(float(grid[row, column])) for grid in numbers]
+        lines = [texts[0], *(f"({text})" for text in texts[1:] if text)]
+        color = "white" if light and np.isfinite(share) else "black"
+        look: dict[str, Any] = {"color": color, "fontsize": 5.5, "linespacing": 0.95}
+        place = column + 0.5, row + 0.5
+        axes.text(*place, "\n".join(lines), ha="center", va="center", **look)
+
+
+def _short(number: float) -> str:
+    if not np.isfinite(number):
+        return ""
+    if 0 < number < 0.01:
+        return "<0.01"
+    if number >= 10_000:
+        return f"{number:.0e}".replace("e+0", "e")
+    return f"{number:.0f}" if number >= 10 else f"{number:.{1 if number < 0.1 else 2}g}"

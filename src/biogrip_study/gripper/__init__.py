@@ -1,0 +1,1 @@
+"""What only the study simulates of the gripper: nonlinear arms, loss of contact, calibration."""

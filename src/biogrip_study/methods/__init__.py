@@ -1,0 +1,1 @@
+"""The study's identification methods beside least squares."""

@@ -1,0 +1,255 @@
+"""The study's answers in sentences and in one table, written from rows of its tables."""
+
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from biogrip.digits import counted, legible, plain, with_unit
+from biogrip.fit.nested_fits import FittedModel, advice, fits_far_better, preferred
+from biogrip.judging.doubts import DOUBTFUL, OK, REJECTED
+from biogrip.judging.quantities import PROVIDED
+from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
+from biogrip.physics.models import CANDIDATES
+from biogrip_study.records.identifications import ALL, share_with_limits
+
+Row = Mapping[str, str]
+
+
+def say_what_the_study_gives(
+    methods: Iterable[Row], shown: str, titles: Mapping[str, str], who: str, tolerance: float
+) -> str:
+    """Say in which share of each case's traces the study's own method finds what genes can encode.
+
+    Rows are those of the table of methods; `shown` is the title of that method, which `who` stands
+    before; the tolerance is of chi-squared. It is "" if no case is simulated.
+    """
+    rows = [row for row in methods if row["method"] == shown]
+    shares = [f"{share_of(row)} on “{titles[row['case']]}”" for row in rows]
+    if not rows:
+        return ""
+    shares[0] = shares[0].replace("(", f"of {rows[0]['seeds']} runs (95 % interval: ", 1)
+    fit = f"ends within {tolerance:g} of the lowest χ² known that its encoding of values allows"
+    return f"{who} {shown} {fit}, in {_listed(shares)}."
+
+
+def say_what_recordings_tell(judged: Sequence[Mapping[str, Any]]) -> str:
+    """Say what a recorded trace determines, or in how many of several each quantity is determined.
+
+    Each is what a file of verdicts has; "" if there are none.
+    """
+    if not judged:
+        return ""
+    every = [quantity for own in judged for quantity in own["quantities"]]
+    fits = Counter(own["fit"] for own in judged)
+    if len(judged) > 1:
+        counts = Counter(it["quantity"] for it in every if it["verdict"] == DETERMINED)
+        shares = [
+            f"{it} is determined in {counts[it]}"
+            for it in dict.fromkeys(q["quantity"] for q in every)
+        ]
+        told = f"Of {len(judged)} traces, {_listed(shares)}."
+    elif fits[REJECTED]:
+        told = "The model cannot give this trace, so that the trace determines nothing."
+    else:
+        named = defaultdict[str, list[str]](list)
+        for it in every:
+            provided = f" (provided {it['provided']})" if it["provided"] else ""
+            named[it["verdict"]].append(it["quantity"] + provided)
+        said = [f"{words} {_listed(named[it])}" for it, words in _TOLD.items() if named[it]]
+        told = f"This trace {'; it '.join(said)}."
+    unsure = [f"{fits[fit]} {fit}" for fit in (DOUBTFUL, REJECTED) if fits[fit]]
+    return told + (f" Of the fits, {_listed(unsure)}." if unsure else "")
+
+
+def say_which_model_is_better(
+    models: Iterable[Row], case: str, candidate: str, fit: str = OK
+) -> str:
+    """Say which model BIC prefers in a case's trace to its own, one of `CANDIDATES`; "" if none.
+
+    Rows are those of the table of models, where the model that made simulated traces has a longer
+    title: none is better. None is simpler and as good if the own fit is rejected.
+    """
+    names = {sample.model.title: name for name, sample in CANDIDATES.items()}
+    tried = [
+        FittedModel(names[row["model"]], *(float(row[f"median_delta_{it}"]) for it in _CRITERIA))
+        for row in models
+        if row["case"] == case and row["model"] in names
+    ]
+    judge = fits_far_better if fit == REJECTED else preferred
+    known = any(each.candidate == candidate for each in tried)
+    return advice(tried, candidate) if known and judge(tried, candidate) else ""
+
+
+_CRITERIA = "aic", "bic"
+_TOLD = {
+    DETERMINED: "determines",
+    BOUNDED_BELOW: "bounds only below",
+    BOUNDED_ABOVE: "bounds only above",
+    NOT_DETERMINED: "tells nothing of",
+}
+
+
+def say_what_traces_tell(coverage: Iterable[Row], titles: Mapping[str, str]) -> str:
+    """Say of which quantities all, none, or what share of the traces are determined.
+
+    Rows are those of the table of coverage; only verdicts from whole profiles count.
+    """
+    shares: dict[str, list[tuple[str, int, int]]] = defaultdict(list)
+    for row in coverage:
+        if runs := int(row["shown_seeds"] or 0):
+            found = titles[row["case"]], int(row["shown_determined"]), runs
+            shares[row["quantity"]].append(found)
+    if not shares:
+        return ""
+    ends = {q: [share_with_limits(*of) for _, *of in each] for q, each in shares.items()}
+    always = [q for q, each in ends.items() if all(low >= 0.9 or at == 1 for at, low, _ in each)]
+    never = [q for q, each in ends.items() if all(high <= 0.1 or at == 0 for at, _, high in each)]
+    runs = max(runs for each in shares.values() for *_, runs in each)
+    all_of, none_of = (share_with_limits(count, runs) for count in (runs, 0))
+
+    def determine(share: tuple[float, float, float], names: Sequence[str]) -> str:
+        rounded = round(share[0], 2)
+        if rounded == 0:
+            return f"{'hardly any' if share[0] else 'none'} determines {_listed(names)}"
+        nearly = "nearly " * (share[0] < 1)
+        return f"{nearly + 'all' if rounded == 1 else _percent(*share)} determine {_listed(names)}"
+
+    told = [f"Of {counted(runs, 'trace')} of each sample"]
+    for names, worst in ((always, min), (never, max)):
+        if names:
+            share = worst(of for name in names for of in ends[name])
+            about = {min: "at least ", max: "at most "}[worst] * (0.005 < share[0] < 0.995)
+            provided = f", {PROVIDED}," * any(" + " in name for name in names)
+            told.append(f"{about}{determine(share, names)}{provided}")
+    first = f"{told[0]} {' and '.join(told[1:])}".rstrip(",") + "." if told[1:] else ""
+    of_title: dict[str, dict[tuple[float, float, float], list[str]]]
+    of_title = defaultdict(lambda: defaultdict(list))
+    for name in (name for name in shares if name not in (*always, *never)):
+        for (title, *_), limits in zip(shares[name], ends[name], strict=True):
+            of_title[title][limits].append(name)
+    said = [
+        f"On “{title}” {_listed([determine(*each) for each in by_share.items()])}."
+        for title, by_share in of_title.items()
+    ]
+    if not first:
+        said[0] = f"{told[0]}, on{said[0].removeprefix('On')}"
+    sure = f"all is {100 * all_of[1]:.0f} to 100 %, none 0 to {100 * none_of[2]:.0f} %"
+    return " ".join(filter(None, [first, *said, legible(f"(95 % intervals: {sure}.)")]))
+
+
+def say_which_method_finds_it(methods: Iterable[Row], shown: str) -> str:
+    """Say how often the surest method reaches that, and what it takes beside the study's own.
+
+    Parameters are those of `say_what_the_study_gives`.
+    """
+    found: dict[str, list[Row]] = defaultdict(list)
+    for row in methods:
+        found[row["method"]].append(row)
+    if not found:
+        return ""
+
+    def worst(name: str) -> tuple[float, float]:
+        lowest = min(float(row["reached_share"]) for row in found[name])
+        return lowest, -max(float(row["median_evaluations"]) for row in found[name])
+
+    surest = max(found, key=worst)
+    least, *more = sorted(found[surest], key=lambda row: float(row["reached_share"]))
+    at_least = "at least " * (more != [] and share_of(least) != share_of(more[-1]))
+    said = (
+        f"{surest[:1].upper()}{surest[1:]} comes as low, or lower, in {at_least}"
+        f"{share_of(least)} of the runs on {'each' if more else 'the'} sample, with "
+        f"{_responses(found[surest])} simulated responses"
+    )
+    if shown in found and shown != surest:
+        said += f"; the {shown} takes {_responses(found[shown])}"
+    return f"{said}."
+
+
+def rows_beside_the_paper(
+    compared: Iterable[Row], titles: Mapping[str, str]
+) -> list[dict[str, str]]:
+    """Return the paper's Tables 5 to 7 beside the study's runs.
+
+    Quantities of which no sample's trace tells anything are left out. Rows are those of the table
+    of that name.
+    """
+    rows = list(compared)
+    told = {row["quantity"] for row in rows if row["verdict"] != "not identifiable"}
+    return [
+        {
+            "sample": titles[row["case"]],
+            "quantity": legible(with_unit(row["quantity"], row["unit"])),
+            "target": _number(row["target"]),
+            "paper": _ends(row, "printed_from", "printed_to")
+            + f" ({_ends(row, 'error_from_percent', 'error_to_percent', ' %', 3)})",
+            "runs": f"{row['runs']}, {row['reading']}",
+            "error of a run": legible(f"{_number(row['median_error_percent'], 2)} %")
+            + f" ({_ends(row, 'median_from_percent', 'median_to_percent', ' %', 2)})",
+            "runs near the paper's value": _percent(
+                *(float(row[f"near_{end}"]) for end in ("share", "from", "to"))
+            )
+            + f": {row['verdict']}",
+        }
+        for row in rows
+        if row["quantity"] in told
+    ]
+
+
+def compared_rows(
+    errors: Iterable[Row], verdicts: Iterable[Row], titles: Mapping[str, str]
+) -> list[dict[str, str]]:
+    """Return targets beside the study's results, with the median error of a run in brackets.
+
+    Quantities that no case determines are left out, and medians between quartiles a decade apart:
+    runs in two humps have none near their median. Rows are those of the tables of errors and
+    verdicts, titles those of the cases.
+    """
+    decided = {row["quantity"] for row in verdicts if row["verdict"] == DETERMINED}
+    return [
+        {
+            "sample": titles[row["case"]],
+            "quantity": legible(with_unit(row["parameter"], row["unit"])),
+            "target": _number(row["target"]),
+            "this study: median": _median(row),
+            "quartiles": _ends(row, "p25_identified", "p75_identified"),
+        }
+        for row in errors
+        if row["parameter"] in decided and row["basin"] == ALL and row["target"]
+    ]
+
+
+def _ends(row: Row, low: str, high: str, unit: str = "", digits: int = 4) -> str:
+    return legible(f"{_number(row[low], digits)} to {_number(row[high], digits)}{unit}")
+
+
+def _median(row: Row) -> str:
+    low, high = float(row["p25_identified"]), float(row["p75_identified"])
+    if high > 10 * low:
+        return "spread over decades"
+    error = row["median_absolute_error_percent"]
+    said = f" ({plain(float(f'{float(error):.2g}'))} %)" if error else ""
+    return _number(row["median_identified"]) + legible(said)
+
+
+def share_of(row: Row) -> str:
+    """Return a row's share of runs that reach the best encodable point, with its interval."""
+    return _percent(*(float(row[f"reached_{key}"]) for key in ("share", "low", "high")))
+
+
+def _percent(share: float, low: float, high: float) -> str:
+    return legible(f"{100 * share:.0f} % ({100 * low:.0f} to {100 * high:.0f} %)")
+
+
+def _responses(rows: Iterable[Row]) -> str:
+    values = [float(row["median_evaluations"]) for row in rows]
+    low, high = (f"{float(f'{end:.2g}'):,.0f}" for end in (min(values), max(values)))
+    return low if low == high else f"{low} to {high}"
+
+
+def _listed(names: Sequence[str]) -> str:
+    *others, last = names
+    return f"{', '.join(others)} and {last}" if others else last
+
+
+def _number(text: str, digits: int = 4) -> str:
+    return legible(plain(float(f"{float(text):.{digits}g}"), digits)) if text else ""

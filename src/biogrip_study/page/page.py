@@ -1,0 +1,281 @@
+"""The pages of a study, self-contained HTML: the report, and what one trace of a case tells."""
+
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from html import escape
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import PIL.Image
+import yaml
+
+from biogrip import __version__
+from biogrip.digits import legible, significant, with_unit
+from biogrip.errors import BiogripError
+from biogrip.figures.fit import scale_of
+from biogrip.files import write_text
+from biogrip.judging.quantities import quantity_value
+from biogrip.page.templates import data_url, environment
+from biogrip.physics.noise import rms
+from biogrip.records import read_table, whole
+from biogrip_study.config.study import Case, Study
+from biogrip_study.page import answers
+from biogrip_study.records.identifications import read_verdicts
+from biogrip_study.records.traces import read_measurements
+from biogrip_study.stages.judgement import TRACE
+
+# Characters left for images in a report of at most 8 MB.
+_MOST_PICTURE_LETTERS = 2_800_000
+_LIBRARIES = ("numpy", "scipy", "pandas", "matplotlib", "snakemake")
+# Tables, or beginnings of their names, that answers are written from.
+_ANSWERING = (
+    *("errors.csv", "verdicts_", "coverage.csv"),
+    *("methods.csv", "tables_5_to_7.csv", "models.csv"),
+)
+# Tables under what is reconstructed; the others are under their heading.
+_EVIDENCE = ("gripper", "gene_ranges", "evidence", "printed_values")
+# What only the paper's page shows of the gripper and the default search ranges.
+_OF_THE_PAPER = (
+    *("comb", "linkage", "torque", "gripper", "actuator", "left_out"),
+    *("gene_ranges", "parameter_ranges"),
+)
+# What is unfolded of a case on a page of one's own.
+_UNFOLDED = "judged_fit", "profiles"
+_QUESTION = "How well can a MEMS microgripper identify the viscoelastic parameters of a cell?"
+_MOST_TITLES = 3
+# The paper's figure of its first fit, between those of its convergence and of its evolution.
+_FIRST_FIT = 9
+# Parameters that have a slider.
+_SLID = "k", "k_p", "c", "c_p"
+# As many readings as a curve of a few hundred pixels shows.
+_MOST_READINGS = 800
+# More digits than a screen shows, and fewer than those in which processors differ.
+_DIGITS = 6
+# How far a slider goes below the least and above the largest parameter.
+_BEYOND = 10.0
+
+TEMPLATES = environment(Path(__file__).parent)
+TEMPLATES.globals |= {"target_of": quantity_value}
+_NUMBER = re.compile(r"(?:&[gl]t;|[≤≥−])*\d[\d.]*(·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?(\u00a0%)?")
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A figure or a table on the page."""
+
+    name: str
+    """What it shows."""
+    whose: str
+    """Name of its case or sweep, if any."""
+    title: str
+    caption: str
+    file: Path
+    content: str | None = None
+    """Table element, or data URL of an image; None if there is no room for it."""
+    size: tuple[int, int] = (0, 0)
+    """Width and height of an image, px."""
+    download: str = ""
+    """Data URL of a table's CSV."""
+
+
+def write_report(
+    study: Study,
+    captions: list[Path],
+    figures: list[Path],
+    tables: list[Path],
+    downloads: list[Path],
+    verdicts: list[Path],
+    measurements: list[Path],
+    page: Path,
+    front: Path,
+) -> None:
+    """Write the report of a study as HTML, and its answers alone.
+
+    Captions are text, named like what they are of; figures are PNG, tables HTML, downloads the same
+    tables as CSV. Verdicts and measurements with the judged trace are those of all cases in their
+    order.
+    """
+    texts = {
+        (path.parent.name, path.stem): " ".join(path.read_text(encoding="utf-8").split())
+        for path in captions
+    }
+    titles = {case.name: case.title for case in study.cases.values()}
+    owners = titles | {name: sweep.title or name for name, sweep in study.config.sweeps.items()}
+    cases = list(study.cases.values())
+    measured = zip(cases, measurements, strict=True)
+    movable = [(case, of) for case, of in measured if study.published and has_sliders(case)]
+    # Where the branch relaxes fastest, its damper and the parallel one are told apart least.
+    movable.sort(key=lambda it: it[0].parameters["c"] / it[0].parameters["k"])
+    errors, judged, covered, compared, beside, models = (
+        [row for csv in downloads if csv.name.startswith(name) for row in read_table(csv)]
+        for name in _ANSWERING
+    )
+    listed: list[Entry] = []
+    for path, csv in zip(tables, downloads, strict=True):
+        entry, download = entry_of(path, owners, texts), data_url("text/csv", whole(csv).encode())
+        if entry.caption in (it.caption for it in listed):
+            entry = replace(entry, caption="")
+        listed.append(replace(entry, content=_table(path, titles), download=download))
+    drawn = [
+        replace(entry_of(path, owners, texts), content=image, size=size)
+        for path, (image, size) in zip(figures, _images(figures), strict=True)
+    ]
+    if study.published:
+        story = _as_in_paper(drawn, [study.cases[name] for name in study.published])
+    else:
+        drawn, listed = ([it for it in own if _is_own(it, study)] for own in (drawn, listed))
+        story = [it for it in drawn if it.name in _UNFOLDED]
+    told = [replace(it, title="What a trace tells") for it in drawn if it.name == "answer"]
+    placed = {entry.file for entry in told + story}
+    folded: dict[str, list[Entry]] = {}
+    for entry in drawn:
+        if entry.file not in placed:
+            folded.setdefault(owners.get(entry.whose, "The study"), []).append(entry)
+    found = [*zip(cases, map(read_verdicts, verdicts), strict=True)]
+    own = [it for case, it in found if case.recorded and not study.published]
+    asked = compared, study.shown_method.title
+    who = "Run again, the paper's" if study.published else "The"
+    every = [*titles.values()]
+    named = ", ".join(every) if len(every) <= _MOST_TITLES else f"{len(every)} samples"
+    shown = {
+        "sliders": slid(*movable[0]) if movable else None,
+        "answers": [
+            answers.say_what_recordings_tell(own),
+            answers.say_what_traces_tell(covered, titles),
+            answers.say_what_the_study_gives(*asked, titles, who, study.optimum_tolerance),
+            answers.say_which_method_finds_it(*asked),
+        ],
+        "compared": answers.rows_beside_the_paper(beside, titles)
+        or answers.compared_rows(errors, judged, titles),
+        "cases": found,
+        "better": {
+            case.name: answers.say_which_model_is_better(
+                models, case.name, case.sample.candidate, own["fit"]
+            )
+            for case, own in found
+        },
+        "told": told,
+        "story": story,
+        "folded": folded,
+        "evidence_tables": [it for it in listed if it.name in _EVIDENCE],
+        "tables": [it for it in listed if it.name not in _EVIDENCE],
+        # But for what changes no result.
+        "config": yaml.safe_dump(
+            {key: value for key, value in study.plain.items() if key != "pdf"}, allow_unicode=True
+        ),
+        "title": _QUESTION if study.published else named,
+        "paper": bool(study.published),
+        "versions": {"biogrip": __version__, **{name: version(name) for name in _LIBRARIES}},
+    }
+    for file, template in ((page, "report"), (front, "answers")):
+        write_text(file, TEMPLATES.get_template(f"{template}.html.j2").render(shown))
+
+
+def write_summary(case: Case, verdicts: Path, figures: list[Path], page: Path) -> None:
+    """Write what the judged trace of a case tells, with figures, PNG."""
+    text = TEMPLATES.get_template("summary.html.j2").render(
+        case=case,
+        found=read_verdicts(verdicts),
+        figures=[(path.stem, data_url("image/png", path.read_bytes())) for path in figures],
+    )
+    write_text(page, text)
+
+
+def _is_own(entry: Entry, study: Study) -> bool:
+    """Tell whether a page without the paper shows it: errors are of simulated traces."""
+    of = [study.cases[entry.whose]] if entry.whose in study.cases else study.cases.values()
+    untold = entry.name == "errors" and all(case.recorded for case in of)
+    return entry.name not in _OF_THE_PAPER and not untold
+
+
+def entry_of(file: Path, owners: Mapping[str, str], texts: Mapping[tuple[str, str], str]) -> Entry:
+    """Return the entry of a file that is named after what it shows, and its case or sweep.
+
+    Owners are their titles; captions are by the file's folder and what it shows.
+    """
+    kind, stem = file.parent.name, file.stem
+    # One name may end with another, and that of a figure with that of a case.
+    ends = sorted((name for name in owners if stem.endswith(f"_{name}")), key=len)
+    whose = "" if (kind, stem) in texts or not ends else ends[-1]
+    name = stem.removesuffix(f"_{whose}")
+    title = name.replace("_", " ").capitalize() + (f": {owners[whose]}" if whose else "")
+    return Entry(name, whose, title, legible(texts[kind, name]), file)
+
+
+def _as_in_paper(figures: Sequence[Entry], published: Sequence[Case]) -> list[Entry]:
+    """Return figures that the paper has, by their numbers there, no caption twice."""
+    numbers = {(case.name, "fit"): case.published.figure for case in published}
+    first = published[0].name if published else ""
+    if numbers.get((first, "fit")) == _FIRST_FIT:
+        numbers |= {(first, "convergence"): _FIRST_FIT - 1, (first, "evolution"): _FIRST_FIT + 1}
+    found = {numbers.get((it.whose, it.name)): it for it in figures}
+    return [
+        replace(it, title=f"Figure {n}. {it.title}", caption=it.caption * (it.whose == first))
+        for n, it in sorted((n, it) for n, it in found.items() if n is not None)
+    ]
+
+
+def _images(paths: Sequence[Path]) -> Iterator[tuple[str | None, tuple[int, int]]]:
+    """Yield images, None when there is no more room, and their sizes."""
+    room = _MOST_PICTURE_LETTERS
+    for path in paths:
+        try:
+            with PIL.Image.open(path) as image:
+                size = image.size
+        # The latter, too, is Pillow's for what is no PNG.
+        except (OSError, SyntaxError) as error:
+            raise BiogripError(f"{path}: cannot be read: {error}.") from error
+        url = data_url("image/png", path.read_bytes())
+        room -= len(url)
+        yield url if room >= 0 else None, size
+
+
+def _table(path: Path, titles: Mapping[str, str]) -> str:
+    """Return the table of an HTML file written by `biogrip_study.tables.layout`, cases titled."""
+
+    def cell(match: re.Match[str]) -> str:
+        text = escape(titles[match[1]]) if match[1] in titles else legible(match[1])
+        return f"<td{' class=number' * bool(_NUMBER.fullmatch(text))}>{text}</td>"
+
+    found = re.search(r"<table.*</table>", path.read_text(encoding="utf-8"), re.DOTALL)
+    if found is None:
+        raise BiogripError(f"{path}: holds no table.")
+    return re.sub("<td>(.*?)</td>", cell, found[0].replace("<th>", '<th scope="col">'))
+
+
+def has_sliders(case: Case) -> bool:
+    """Tell whether a case has the response of the script: one branch, equal arms, only steps."""
+    arms = case.experiment.gripper.left, case.experiment.gripper.right
+    simulated = case.instrument.has_jaws and not case.recorded
+    alone = {*case.parameters} == {*_SLID} and min(case.parameters.values()) > 0
+    return simulated and alone and arms[0] == arms[1] and not case.torque.changes[:, 1:].any()
+
+
+def slid(case: Case, measurements: Path) -> dict[str, Any]:
+    """Return a case's first trace, thinned, with its parameters, arm and steps, in SI units."""
+    recorded, gripper = read_measurements(measurements, [TRACE]), case.experiment.gripper
+    readings, target = recorded.readings[TRACE], recorded.target
+    assert target is not None
+    factor, unit = scale_of(readings, case.instrument.read.unit)
+    stride = -(-len(readings) // _MOST_READINGS)
+    values = case.parameters.values()
+    return {
+        "title": case.title,
+        "noise": f"{factor * rms((readings - target)[::stride]):.4g}",
+        "times": recorded.time_s[::stride].tolist(),
+        "readings": significant(readings[::stride], _DIGITS).tolist(),
+        "factor": factor,
+        "unit": unit,
+        "read": with_unit(case.instrument.read.title, unit),
+        "sample": {name: case.parameters[name] for name in _SLID},
+        "ends": [math.log10(min(values) / _BEYOND), math.log10(max(values) * _BEYOND)],
+        "arm": {
+            "stiffness": gripper.left.stiffness_Nm_per_rad,
+            "damping": gripper.left.damping_Nms_per_rad,
+            "lever": 2 * gripper.lever_m**2,
+        },
+        "steps": [(start, height) for start, _, height in case.torque.jumps],
+    }

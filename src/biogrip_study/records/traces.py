@@ -1,0 +1,129 @@
+"""Files of targets, CSV, and of measurements, npz: traces without and with noise."""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.errors import BiogripError
+from biogrip.physics.instruments import Instrument
+from biogrip.records import AGAIN, whole, write_rows
+from biogrip.traces.reader import Recording
+from biogrip_study.records.rows import read_arrays, write_arrays
+
+# More than any instrument gives, and few enough that results on different processors agree.
+_DIGITS = 9
+_WRITTEN = f"{{:.{_DIGITS - 1}e}}"
+
+
+@dataclass(frozen=True)
+class Measurements:
+    """Noisy traces of one case."""
+
+    time_s: Array
+    """Sampling instants, ascending, (n_samples,)."""
+    target: Array | None
+    """Trace without noise, (n_samples,); None for a recorded trace."""
+    readings: dict[int, Array]
+    """Noisy trace of each seed, (n_samples,) each."""
+    sd: Array | None = None
+    """Standard deviations of the readings, (n_samples,), where they are known."""
+    sd_known: bool = True
+    """False if only their ratios are, see `Recording.sd_known`."""
+    onset_s: float | None = None
+    """Time of a recording's clock from which the times count, if it was given or fitted."""
+    remarks: tuple[str, ...] = ()
+    """Sentences on reading a recording."""
+
+    @property
+    def recording(self) -> Recording:
+        """The only trace, a recorded one."""
+        (readings,) = self.readings.values()
+        index = np.arange(len(readings))
+        return Recording(
+            self.time_s,
+            readings,
+            index,
+            sd=self.sd,
+            sd_known=self.sd_known,
+            onset_s=self.onset_s,
+            remarks_before=self.remarks,
+        )
+
+
+def write_target(
+    path: Path,
+    instrument: Instrument,
+    time_s: Array,
+    controlled: Array,
+    read: Array,
+    jaw_force_N: Array | None = None,
+) -> None:
+    """Write a noise-free trace as CSV, all arrays (n_samples,), with the force if there are jaws.
+
+    Numbers have nine significant digits. The force has these of its largest value, since values
+    near its zeros are rounding errors.
+    """
+    columns = ["time_s", instrument.controlled.column, instrument.read.column]
+    simulated = [read]
+    if jaw_force_N is not None:
+        largest = float(np.max(np.abs(jaw_force_N)))
+        digit = 10.0 ** (math.floor(math.log10(largest)) + 1 - _DIGITS) if largest else 1.0
+        columns.append("jaw_force_N")
+        simulated.append((np.round(jaw_force_N / digit) + 0.0) * digit)
+    rows = (
+        (f"{t:.10g}", f"{x:.10g}", *map(_WRITTEN.format, values))
+        for t, x, *values in zip(time_s, controlled, *simulated, strict=True)
+    )
+    write_rows(path, columns, rows)
+
+
+def read_target(path: Path, times_s: Array) -> tuple[Array, Array, Array]:
+    """Read time, what is controlled and what is read of a target, of just the times given, (n,)."""
+    # Without pandas, which most jobs that read a target do not import.
+    lines = whole(path, "a target").splitlines()[1:]
+    try:
+        values = np.loadtxt(lines or ["nan,nan,nan"], delimiter=",", usecols=(0, 1, 2), ndmin=2)
+    except ValueError as error:
+        raise BiogripError(f"{path}: cannot be read as a target: {error}. {AGAIN}") from error
+    time_s, controlled, read = values.T
+    if [*time_s] != [float(f"{t:.10g}") for t in times_s]:
+        text = f"found {len(lines)} readings, wanted {len(times_s)} at the times of the config"
+        raise BiogripError(f"{path}: {text}. {AGAIN}")
+    return time_s, controlled, read
+
+
+def write_measurements(path: Path, measurements: Measurements) -> None:
+    """Write noisy traces as npz: time_s, seeds, traces in their order, and what else is known."""
+    arrays = {
+        "time_s": measurements.time_s,
+        "target": measurements.target,
+        "sd": measurements.sd,
+        "sd_known": None if measurements.sd_known else False,
+        "seeds": list(measurements.readings),
+        "traces": list(measurements.readings.values()),
+        "onset_s": measurements.onset_s,
+        "remarks": measurements.remarks or None,
+    }
+    write_arrays(path, {name: values for name, values in arrays.items() if values is not None})
+
+
+def read_measurements(path: Path, seeds: list[int] | None = None) -> Measurements:
+    """Read noisy traces of all or of given seeds, which it must have."""
+    found = read_arrays(path)
+    traces = dict(zip(found["seeds"].tolist(), found["traces"], strict=True))
+    if missing := set(seeds or ()) - set(traces):
+        raise BiogripError(f"{path}: has no trace of seed {min(missing)}.")
+    chosen = traces if seeds is None else {seed: traces[seed] for seed in seeds}
+    onset_s = found.get("onset_s")
+    return Measurements(
+        found["time_s"],
+        found.get("target"),
+        chosen,
+        sd=found.get("sd"),
+        sd_known="sd_known" not in found,
+        onset_s=None if onset_s is None else float(onset_s),
+        remarks=tuple(map(str, found.get("remarks", ()))),
+    )

@@ -1,0 +1,187 @@
+"""Judgement of a case: verdicts on its first trace, those to expect, and intervals of many seeds.
+
+`judge` writes verdicts on the first trace of a case, as `biogrip identify` judges it; of a
+simulated one the experiment is known, so that neither start, offset, drift nor model are doubted.
+`expect` writes those to expect of any, from the trace without noise.
+
+`estimate` tests the coverage of limits and the spread of fits. Every seed is fitted by least
+squares, and quantities that traces should determine get limits from their profile likelihoods. A
+second estimate has parameters without information fixed at their true values, as the Cramér-Rao
+bound assumes. Some seeds get a full verdict as well, as users are shown it: multiples of
+`verdicts_every`, whatever the batch.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from biogrip.arrays import Array, IntArray
+from biogrip.digits import rounded_numbers
+from biogrip.fit.experiment import Experiment
+from biogrip.fit.least_squares import fit_from, identify_from
+from biogrip.fit.trace_fit import TraceFit, fit_least_squares
+from biogrip.identify.data import judged_data
+from biogrip.identify.identify import identify_alike
+from biogrip.judging.diagnosis import Diagnosis, diagnose, profiled, settled
+from biogrip.judging.likelihood import Likelihood, covariance
+from biogrip.judging.quantities import Quantity, parameters_and_sum
+from biogrip.judging.verdicts import DETERMINED, Finding, compute_findings
+from biogrip.physics.noise import add_noise, rms, standard_deviation
+from biogrip.physics.sample_model import SampleModel, with_fixed
+from biogrip.records import write_object
+from biogrip.terminal import Progress
+from biogrip_study.config.study import Case
+from biogrip_study.gripper.calibration import with_calibration
+from biogrip_study.records.identifications import INTERVALS, read_verdicts
+from biogrip_study.records.traces import read_measurements, read_target
+from biogrip_study.stages.identification import experiment_for, groups
+
+TRACE = 0
+"""Seed of the trace that is judged."""
+
+
+def judge(case: Case, measurements: Path, calibrated: list[Path], verdicts: Path) -> None:
+    """Identify the trace of seed 0, and write verdicts and profiles."""
+    recorded = read_measurements(measurements, [TRACE])
+    experiment = experiment_for(case.judged_experiment, recorded, calibrated)
+    (diagnosis,) = identify_alike([(recorded.recording, experiment)])
+    assert diagnosis.fit
+    _write(verdicts, case, diagnosis, {"noise_model": diagnosis.fit.noise_data()})
+
+
+def expect(case: Case, target: Path, calibrated: list[Path], expected: Path) -> None:
+    """Write verdicts on the trace without noise, judged with the noise level of the measurement.
+
+    They are what to expect of any trace of the case. Without noise, the rounding of the
+    target's digits takes its place.
+    """
+    experiment = with_calibration(case.experiment.to_identify(), calibrated)
+    time_s, _, rotation = read_target(target, case.times_s)
+    noise_sd = rms(standard_deviation(rotation, case.noise)) or None
+    problem = experiment.of(time_s, rotation, noise_sd=noise_sd)
+    truth = experiment.logs(case.parameters)
+    found = identify_from(problem, truth)
+    misfit = float(problem.residuals.misfit(np.exp(truth)[None])[0])
+    gain = len(time_s) * (misfit**2 - found.misfit**2) / (noise_sd or found.misfit) ** 2
+    if gain < _ROUNDING:
+        # Along what nothing tells, digits of the target would choose, and those of a processor.
+        found = replace(found, parameters=np.exp(truth), misfit=misfit, converged=True)
+    diagnosis = diagnose(problem, found, confidence=case.confidence)
+    _write(expected, case, diagnosis, {})
+
+
+def _write(path: Path, case: Case, diagnosis: Diagnosis, more: dict[str, Any]) -> None:
+    """Write a diagnosis as JSON. The case says what is read, and no name has its unit."""
+    said = {
+        key.removesuffix("_rad"): value
+        for key, value in rounded_numbers(judged_data(diagnosis)).items()
+    }
+    head = {"case": case.name, "model": case.sample.model.name, "confidence": case.confidence}
+    write_object(path, head | said | more)
+
+
+# Decrease of chi^2 from the true parameters that is rounding.
+_ROUNDING = 1e-3
+# Significant digits, and those of values known to within a relative `_NARROW`.
+_DIGITS, _MORE_DIGITS, _NARROW = 5, 9, 1e-3
+# Local fits need less memory per seed than populations.
+_TIMES = 2
+
+
+def estimate(
+    case: Case,
+    seeds: Sequence[int],
+    target: Path,
+    expected: Path,
+    calibrated: list[Path],
+    intervals: Path,
+) -> None:
+    """Fit a batch of seeds, and compute intervals of what `expected` verdicts call determined.
+
+    The noise of a seed is that of its measurement.
+    """
+    experiment = with_calibration(case.judged_experiment, calibrated)
+    time_s, _, rotation = read_target(target, case.times_s)
+    found = read_verdicts(expected)["quantities"]
+    determined = {item["quantity"] for item in found if item["verdict"] == DETERMINED}
+    every = parameters_and_sum(experiment.searched)
+    selected = [quantity for quantity in every if quantity.label in determined]
+    rest_known, informed, truth = _rest_known(case, experiment, time_s, rotation)
+    often = case.block.identifiability.verdicts_every
+    progress = Progress(f"{case.name}, intervals", len(seeds))
+    rows: list[tuple[Any, ...]] = []
+    for group in groups(seeds, _TIMES):
+        rngs = [experiment.stream("noise", seed) for seed in group]
+        traces = [add_noise(rotation, case.noise, rng, time_s) for rng in rngs]
+        fits = fit_least_squares(
+            [experiment] * len(traces),
+            [(time_s, trace) for trace in traces],
+            [experiment.stream("coverage", seed) for seed in group],
+        )
+        known = np.tile(truth, (len(group), 1))
+        if len(informed):
+            simpler = experiment.of_each(time_s, traces, rest_known)
+            known[:, informed] = fit_from(simpler, truth[informed]).x
+        for in_full, shown in ((True, every), (False, selected)):
+            some = [i for i, seed in enumerate(group) if (seed % often == 0) == in_full]
+            if not (some and shown):
+                continue
+            judged = judge_quantities([fits[i] for i in some], shown, case.confidence)
+            for i, diagnosis in zip(some, judged, strict=True):
+                for quantity, finding in zip(shown, diagnosis.findings, strict=True):
+                    given = (finding, known[i]) if quantity in selected else None
+                    texts = _estimates(quantity, diagnosis.likelihood.best, given)
+                    ends = finding.low, finding.high
+                    limits = ("" if end is None else f"{end:.5g}" for end in ends)
+                    verdict = (finding.verdict, *limits) if in_full else ("", "", "")
+                    rows.append((case.name, quantity.label, group[i], *texts, *verdict))
+        progress.done(len(group))
+    INTERVALS.write(intervals, sorted(rows, key=lambda row: row[2]))
+
+
+def _rest_known(
+    case: Case, experiment: Experiment, time_s: Array, rotation: Array
+) -> tuple[SampleModel, IntArray, Array]:
+    """Return the model with uninformed parameters fixed, indices of the others, and the truth."""
+    truth = experiment.logs(case.parameters)
+    _, sensitivity = experiment.of(time_s, rotation).residuals(truth)
+    spread = np.diag(covariance(sensitivity, standard_deviation(rotation, case.noise)))
+    informed = np.flatnonzero(np.isfinite(spread))
+    names = experiment.searched.names
+    given = {name: case.parameters[name] for i, name in enumerate(names) if i not in informed}
+    return with_fixed(experiment.searched, given), informed, truth
+
+
+def judge_quantities(
+    fits: Sequence[TraceFit], quantities: Sequence[Quantity], confidence: float
+) -> list[Diagnosis]:
+    """Judge quantities of traces as users are shown them, but for notes and combinations."""
+
+    def profile(likelihoods: Sequence[Likelihood]) -> list[Diagnosis]:
+        every = compute_findings(likelihoods, quantities, smooth=False)
+        return [profiled(*pair, []) for pair in zip(likelihoods, every, strict=True)]
+
+    problems, found = [fit.problem for fit in fits], [fit.found for fit in fits]
+    judged = settled(problems, found, profile, confidence=confidence)
+    return [diagnosis for diagnosis, _ in judged]
+
+
+def _estimates(
+    quantity: Quantity, best: Array, with_limits: tuple[Finding, Array] | None
+) -> list[str]:
+    """Return estimate, limits and estimate with the rest fixed, as text; the last three if given.
+
+    Given are limits and the log-parameters of the fit with the rest fixed.
+    """
+    logs, digits = [quantity.log(best), None, None, None], _DIGITS
+    if with_limits is not None:
+        finding, known = with_limits
+        low, high = finding.profile.low, finding.profile.high
+        logs[1:] = low, high, quantity.log(known)
+        narrow = low is not None and high is not None and high - low < _NARROW
+        digits = _MORE_DIGITS if narrow else _DIGITS
+    return ["" if log is None else f"{math.exp(log):.{digits}g}" for log in logs]

@@ -1,0 +1,122 @@
+"""What is simulated of a case: its response, noisy traces of it, and a test without sample.
+
+A target is the response without noise: what the instrument reads and, of the gripper, the force of
+the jaws. A measurement adds noise to it, a trace a seed; of a recorded trace it is what was read of
+the user's file. A calibration identifies the gripper's arms by a test without sample.
+"""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.errors import BiogripError
+from biogrip.files import write_text
+from biogrip.physics.noise import Noise, add_noise, stream
+from biogrip.physics.protocol import evaluate, sample_times
+from biogrip.terminal import warn
+from biogrip.traces.columns import place
+from biogrip_study.config.study import Case
+from biogrip_study.gripper.calibration import FreeMotion, calibrate, calibration_yaml, free_motion
+from biogrip_study.gripper.simulation import jaw_force, target_grip, target_rotation
+from biogrip_study.gripper.unilateral import unilateral_response
+from biogrip_study.records.rows import write_arrays
+from biogrip_study.records.traces import Measurements, read_target, write_measurements, write_target
+
+
+def simulate(case: Case, target: Path) -> None:
+    """Simulate a case, and write its target, CSV.
+
+    A response that is not finite, or turns the arms beyond the combs' stroke, is an error.
+    """
+    time_s = case.times_s
+    read, force = response(case, time_s)
+    _check_finite(case, time_s, read)
+    if case.instrument.has_jaws:
+        largest = float(np.max(np.abs(read)))
+        if largest > case.stroke:
+            raise BiogripError(
+                f"the protocol turns the arms by {1e3 * largest:.4g} mrad, allowed is what the "
+                f"comb drive's stroke leaves, {1e3 * case.stroke:.4g} mrad."
+            )
+        _warn_if_contact_is_lost(case)
+    write_target(target, case.instrument, time_s, evaluate(case.torque, time_s), read, force)
+
+
+def response(case: Case, time_s: Array) -> tuple[Array, Array | None]:
+    """Return what is read and, if there are jaws, their force, (n_samples,) each."""
+    device, nonlinear = (case.gripper, case.network, case.torque), case.nonlinear_target
+    if case.unilateral:
+        found = unilateral_response(*device, time_s)
+        return found.rotation[0], found.jaw_force_N
+    read = target_rotation(*device, time_s, nonlinear=nonlinear)[0]
+    if not case.instrument.has_jaws:
+        return read, None
+    return read, jaw_force(*device, time_s, nonlinear=nonlinear)[0]
+
+
+def _check_finite(case: Case, time_s: Array, simulated: Array) -> None:
+    model, read = case.sample.model, case.instrument.read.name
+    for sample in np.flatnonzero(~np.isfinite(simulated))[:1]:
+        values = ", ".join(f"{name} = {case.parameters[name]:g}" for name in model.names)
+        raise BiogripError(
+            f"the simulated {read} of {model.title} with {values} is {simulated[sample]} "
+            f"at {time_s[sample]:g} s; allowed are parameters, a gripper and a protocol for which "
+            "it is finite."
+        )
+
+
+def _warn_if_contact_is_lost(case: Case) -> None:
+    device = case.gripper, case.network, case.torque
+    grip = target_grip(*device, nonlinear=case.nonlinear_target)
+    if words := grip.words():
+        then = "without adhesion contact is lost there (contact: unilateral simulates that)"
+        if case.unilateral:
+            then = "contact is lost there, which its identification ignores"
+        warn(f"{case.name}: under this protocol {words}; {then}.")
+
+
+def measure(case: Case, seeds: Iterable[int], target: Path, measurements: Path) -> None:
+    """Add noise of each seed in a batch to a target, CSV, and write the traces, npz."""
+    time_s, _, rotation = read_target(target, case.times_s)
+    rngs = {seed: stream(case.study.config.study_seed, case.name, seed, "noise") for seed in seeds}
+    traces = {seed: add_noise(rotation, case.noise, rng, time_s) for seed, rng in rngs.items()}
+    write_measurements(measurements, Measurements(time_s, rotation, traces))
+
+
+def calibrate_gripper(case: Case, gripper: Path, records: Path) -> None:
+    """Simulate both arms' free motion with noise, and identify their properties."""
+    test = case.block.calibration
+    time_s = sample_times(test.duration_s, test.rate_Hz)
+    noise = Noise("gaussian", test.noise_level, "peak")
+    causes = test.step_torque_Nm, test.impulse_Nms
+    columns, found = {"time_s": time_s}, {}
+    for name in ("left", "right"):
+        motion = free_motion(getattr(case.gripper, name), time_s, *causes)
+        rng = stream(case.study.config.study_seed, case.name, 0, f"calibration {name}")
+        record = FreeMotion(
+            time_s, add_noise(motion.step, noise, rng), add_noise(motion.impulse, noise, rng)
+        )
+        columns |= {f"{name}_step_rad": record.step, f"{name}_impulse_rad": record.impulse}
+        found[name] = calibrate(record, *causes)
+    write_arrays(records, columns)
+    write_text(gripper, calibration_yaml(found["left"], found["right"]))
+
+
+def record(case: Case, recorded: Path, measurements: Path) -> None:
+    """Read, check and convert the user's file; errors name file, line and column."""
+    measured = case.block.measurement
+    if measured.load is not None:
+        raise BiogripError(f"{place(recorded)}: measurement.load is only for biogrip identify.")
+    # Imported here: a simulated trace needs neither.
+    from biogrip.identify.prepare import prepare
+    from biogrip.traces.reader import read_recording
+
+    trace, _ = prepare(read_recording(recorded, measured), case.experiment)
+    remarks = tuple(trace.remarks())
+    for remark in remarks:
+        warn(f"{place(recorded)}: {remark}")
+    known = trace.sd, trace.sd_known, trace.onset_s, remarks
+    found = Measurements(trace.time_s, None, {0: trace.readings}, *known)
+    write_measurements(measurements, found)

@@ -1,0 +1,231 @@
+"""What is found of each case: Tables 5 to 7 beside the paper's, and verdicts on its quantities.
+
+What the paper's printed values and errors leave of the numbers that it printed, `interval_of` says.
+"""
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
+from decimal import Decimal, InvalidOperation
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.digits import counted
+from biogrip.judging.quantities import quantity_value
+from biogrip.judging.verdicts import DETERMINED
+from biogrip_study.config.study import Case, Study
+from biogrip_study.records.identifications import (
+    ALL,
+    basins,
+    near_noise,
+    near_noise_words,
+    read_identifications,
+    read_verdicts,
+    share_with_limits,
+)
+from biogrip_study.tables.layout import Column, Row, ShownTable, titled, write
+
+_PERCENTILES = {"p05": 5, "p25": 25, "median": 50, "p75": 75, "p95": 95}
+_COLUMNS = (
+    *titled("case", "parameter", "unit"),
+    Column("target", "Target", 4),
+    Column("paper_identified", "Paper", 4),
+    Column("paper_error_percent", "Paper error %", 2),
+    Column("basin", "Runs that end"),
+    Column("seeds", "Seeds"),
+    *(
+        Column(f"{name}_identified", "Median" if name == "median" else f"{percent} %", 3)
+        for name, percent in _PERCENTILES.items()
+    ),
+    Column("median_error_percent", "Error of the median %", 2),
+    Column("median_absolute_error_percent", "Median abs. error %", 2),
+)
+_BASINS = (
+    "Runs that end near the noise of their trace and runs that end above it have rows of their own "
+    "if a tenth or more end in each. Error = (target - identified) / target."
+)
+
+
+def _columns(near_noise_tolerance: float) -> tuple[Column, ...]:
+    share = f"Share {near_noise_words(near_noise_tolerance)}"
+    ends = (Column(f"near_noise_{end}", f"95 % {end}", 2) for end in ("from", "to"))
+    return (*_COLUMNS, Column("near_noise_share", share, 2), *ends)
+
+
+def write_tables(
+    case: Case,
+    identifications: Path,
+    judged: Path,
+    expected: list[Path],
+    errors: Path,
+    verdicts: Path,
+) -> None:
+    """Write the tables of a case: its errors and its verdicts."""
+    write(errors_of_case(case, identifications), errors)
+    write(verdicts_of_case(case, judged, expected), verdicts)
+
+
+def errors_of_case(case: Case, identifications: Path) -> ShownTable:
+    """Compare target and identified values of one case, given its identifications, CSV."""
+    tolerance = case.study.near_noise_tolerance
+    found = read_identifications(identifications, case, case.study.shown_method.name)
+    of_case: Row = {"case": case.name}
+    if found["noise_rms"].notna().all():
+        near = share_with_limits(int(near_noise(found, tolerance).sum()), len(found))
+        of_case |= zip((f"near_noise_{end}" for end in ("share", "from", "to")), near, strict=True)
+    rows = []
+    for basin, runs in ({ALL: found} | basins(found, tolerance)).items():
+        for quantity in case.sample.model.quantities:
+            names = [parameter.name for parameter in quantity]
+            target = quantity_value(label := " + ".join(names), case.parameters)
+            values = runs[[parameter.column for parameter in quantity]].sum(axis=1).to_numpy(float)
+            of_quantity = {
+                "parameter": label,
+                "unit": quantity[0].unit,
+                "target": target,
+                "basin": basin,
+                "seeds": len(runs),
+                "median_error_percent": error_percent(target, np.median(values, keepdims=True))[0],
+                "median_absolute_error_percent": np.median(np.abs(error_percent(target, values))),
+            }
+            for name, percent in _PERCENTILES.items():
+                of_quantity[f"{name}_identified"] = np.percentile(values, percent)
+            rows.append(of_case | of_quantity | _of_paper(case, names, target))
+    number = f"Table {case.published.table}. " if case.published.table is not None else ""
+    caption = (
+        f"{number}{case.title}: target and identified parameters over "
+        f"{counted(len(found), 'seed')}. {_BASINS}"
+        if case.parameters
+        else f"{case.title}: parameters identified in the recorded trace."
+    )
+    return ShownTable(caption, _columns(tolerance), rows)
+
+
+def error_percent(target: float | None, identified: Array) -> Array:
+    """Return (target - identified) / target in percent; NaN if the target is zero or unknown."""
+    if not target:
+        return np.full_like(identified, np.nan)
+    return 100 * (target - identified) / target
+
+
+def _of_paper(case: Case, names: list[str], target: float | None) -> Row:
+    """Return the paper's value and error; of a sum, what its members' printed errors make them."""
+    told = value_in_case(case, names)
+    if told is None:
+        return {}
+    if len(names) > 1:
+        error = error_percent(target, np.array(told[:1]))[0]
+        return {"paper_identified": told[0], "paper_error_percent": error}
+    (name,) = names
+    error = case.published.error_percent.get(name)
+    return {"paper_identified": case.published.identified[name], "paper_error_percent": error}
+
+
+def errors(study: Study, identifications: list[Path]) -> ShownTable:
+    """Join the tables of errors of all cases, given the identifications of each, CSV."""
+    files = zip(study.cases.values(), identifications, strict=True)
+    rows = [dict(row) for case, file in files for row in errors_of_case(case, file).rows]
+    for row in rows:
+        # Text, as ">100", stays; not every case or parameter has one.
+        with suppress(ValueError, TypeError, KeyError):
+            row["paper_error_percent"] = float(row["paper_error_percent"])
+    columns = _columns(study.near_noise_tolerance)
+    return ShownTable(f"Identification errors of all cases. {_BASINS}", columns, rows)
+
+
+_VERDICT_COLUMNS = (
+    *titled("case", "quantity", "unit"),
+    Column("target", "Target", 4),
+    *titled("fit", "verdict"),
+    Column("value", "Estimate", 3),
+    Column("low", "{percent} from", 3),
+    Column("high", "{percent} to", 3),
+    Column("excluded", "Except"),
+    Column("expected_verdict", "Expected verdict"),
+    Column("expected_low", "Expected from", 3),
+    Column("expected_high", "Expected to", 3),
+)
+
+
+def verdicts_of_case(case: Case, measured: Path, expected: list[Path]) -> ShownTable:
+    """List the verdicts on all quantities of a case, and those expected, where there are any."""
+    found, others = read_verdicts(measured), [read_verdicts(path) for path in expected]
+    foreseen_of = {item["quantity"]: item for item in others[0]["quantities"]} if others else {}
+    rows = []
+    for item in found["quantities"]:
+        foreseen = foreseen_of.get(item["quantity"], {})
+        gaps = " and ".join(f"{start:.3g} to {end:.3g}" for start, end in item["excluded"])
+        rows.append(
+            {name: item[name] for name in ("quantity", "unit", "verdict", "low", "high")}
+            | {f"expected_{name}": foreseen.get(name) for name in ("verdict", "low", "high")}
+            | {
+                "case": case.name,
+                "target": quantity_value(item["quantity"], case.parameters),
+                "fit": found["fit"],
+                "value": item["value"] if item["verdict"] == DETERMINED else None,
+                "excluded": gaps,
+            }
+        )
+    trades = "".join(
+        f" {' and '.join(trade['members'])} trade against each other: determined is "
+        f"{trade['quantity']}."
+        for trade in found["trades"]
+    )
+    caption = (
+        f"{case.title}: verdicts on the trace of one seed, from profile likelihoods.{trades} "
+        f"One-sided limits hold with {50 * (1 + found['confidence']):g} % confidence."
+    )
+    if others:
+        caption += " Expected: the same for the trace without noise, judged at the noise level."
+    percent = f"{100 * found['confidence']:g} %"
+    columns = tuple(replace(c, heading=c.heading.format(percent=percent)) for c in _VERDICT_COLUMNS)
+    return ShownTable(caption, columns, rows)
+
+
+def interval_of(
+    printed: float, target: float | None, error_percent: str | None
+) -> tuple[float, float]:
+    """Return the ends of the numbers that are printed so with this error, rounded or cut off.
+
+    Without an error, or with one that is no number or that no such number has, the value alone
+    counts.
+    """
+    values = _ways(Decimal(f"{printed:.15g}"))
+    found = []
+    with suppress(InvalidOperation, TypeError):
+        # The paper's signs differ; on which side a value lies it shows itself.
+        errors = _ways(abs(Decimal(error_percent or "unknown")))
+        true = Decimal(f"{target:.15g}" if target else "unknown")
+        sign = -1 if printed < true else 1
+        for value, error in product(values, errors):
+            ends = sorted(true * (1 + sign * end / 100) for end in error)
+            found.append((max(value[0], ends[0]), min(value[1], ends[1])))
+    held = [ends for ends in found if ends[0] <= ends[1]] or values
+    return float(min(low for low, _ in held)), float(max(high for _, high in held))
+
+
+def value_in_case(case: Case, names: Sequence[str]) -> tuple[float, float, float] | None:
+    """Return the paper's value of a parameter or of a sum, and its interval; None if it has none.
+
+    The value is the printed one if it has the printed error, else the middle of the interval.
+    """
+    told = case.published
+    if not all(name in told.identified for name in names):
+        return None
+    sums = [0.0, 0.0, 0.0]
+    for name in names:
+        printed, target = told.identified[name], case.parameters.get(name)
+        low, high = interval_of(printed, target, told.error_percent.get(name))
+        value = printed if low <= printed <= high else (low + high) / 2
+        sums = [total + each for total, each in zip(sums, (value, low, high), strict=True)]
+    return sums[0], sums[1], sums[2]
+
+
+def _ways(printed: Decimal) -> list[tuple[Decimal, Decimal]]:
+    """Return the numbers that are printed so if they are rounded, and if they are cut off."""
+    step = Decimal(1).scaleb(int(printed.as_tuple().exponent))
+    cut = (printed if printed else printed - step, printed + step)
+    return [(printed - step / 2, printed + step / 2), cut]

@@ -1,0 +1,313 @@
+"""Tables of a whole study: methods and models on its traces, and how often limits are true."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from scipy.special import betaincinv
+
+from biogrip.fit.nested_fits import aic_and_bic
+from biogrip.judging.levels import WIDE
+from biogrip.judging.likelihood import bound
+from biogrip.judging.quantities import Quantity, parameters_and_sum, quantity_value
+from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
+from biogrip.physics.noise import standard_deviation
+from biogrip_study.config.study import Case, Study
+from biogrip_study.gripper.calibration import with_calibration
+from biogrip_study.methods.registry import METHODS
+from biogrip_study.records.identifications import (
+    ENCODABLE,
+    INTERVALS,
+    MODEL_FITS,
+    chi_square_increase,
+    reached_encodable,
+    read_identifications,
+    share_with_limits,
+)
+from biogrip_study.records.rows import require_rows, seeds_of
+from biogrip_study.records.traces import read_target
+from biogrip_study.tables.cases import error_percent
+from biogrip_study.tables.layout import Column, Row, ShownTable, titled
+
+_METHOD_COLUMNS = (
+    *titled("case", "method", "seeds"),
+    Column("reached_share", "Share that reached the best encodable point", 2),
+    Column("reached_low", "95 % from", 2),
+    Column("reached_high", "95 % to", 2),
+    Column("median_rise", "Median Δχ²", 2),
+    Column("encodable_rise", "Median Δχ² of that point", 2),
+    Column("median_evaluations", "Median responses", 3),
+)
+
+
+def methods(study: Study, identifications: list[Path]) -> ShownTable:
+    """Compare success rate, errors and cost of each method."""
+    rows = []
+    labels = {}
+    for (name, case), path in zip(study.cases.items(), identifications, strict=True):
+        found = read_identifications(path, case)
+        found["increase"] = chi_square_increase(found, case)
+        found["least"] = chi_square_increase(found, case, ENCODABLE)
+        found["reached"] = reached_encodable(found, case)
+        for method, mine in found.groupby("method", sort=False):
+            row: Row = {
+                "case": name,
+                "method": METHODS[method].title,
+                "seeds": len(mine),
+                "median_rise": np.median(mine["increase"]),
+                "encodable_rise": np.median(mine["least"]),
+                "median_evaluations": float(mine["evaluations"].median()),
+            }
+            shares = share_with_limits(int(mine["reached"].sum()), len(mine))
+            row |= zip(("reached_share", "reached_low", "reached_high"), shares, strict=True)
+            for quantity in case.sample.model.quantities:
+                label = " + ".join(p.name for p in quantity)
+                values = mine[[p.column for p in quantity]].sum(axis=1).to_numpy(float)
+                error = np.abs(error_percent(quantity_value(label, case.parameters), values))
+                row[f"error_percent {label}"] = np.median(error)
+                labels[f"error_percent {label}"] = f"Error {label} %"
+            rows.append(row)
+    errors = (Column(name, heading, 2) for name, heading in labels.items())
+    caption = (
+        "Methods on the same traces. Reached: chi-squared, in mean squares of that point, at most "
+        f"{study.optimum_tolerance:g} above that of the best point that the genes can encode of "
+        "the trace (95 % interval by Wilson); methods without digits may lie below. That point is "
+        "the lowest around the ends of all methods' runs: were there a lower one, a run that is "
+        "just within the bound would not count. Δχ² is above the lowest that any method, or the "
+        "truth, has on the trace. Errors are medians of the absolute error."
+    )
+    return ShownTable(caption, (*_METHOD_COLUMNS, *errors), rows)
+
+
+_MODEL_COLUMNS = (
+    *titled("case", "model", "parameters"),
+    Column("median_delta_aic", "Median ΔAIC", 3),
+    Column("median_delta_bic", "Median ΔBIC", 3),
+    Column("chosen_by_aic", "Chosen by AIC"),
+    Column("chosen_by_bic", "Chosen by BIC"),
+    Column("seeds", "Seeds"),
+)
+
+
+def models(study: Study, fits: list[Path]) -> ShownTable:
+    """Count over seeds which model has the lowest AIC and BIC, see `aic_and_bic`."""
+    found = pd.concat([read_fits(study, path) for path in fits])
+    found["aic"], found["bic"] = aic_and_bic(found["misfit"], found["samples"], found["parameters"])
+    rows = []
+    for case, made in study.cases.items():
+        maker = None if made.recorded else made.sample.candidate
+        of_case = found[found["case"] == case]
+        # In the configured order, since idxmin takes the first of equals.
+        tried = list(of_case["model"].unique())
+        values = {c: of_case.pivot(index="seed", columns="model", values=c) for c in ("aic", "bic")}
+        delta = {c: wide[tried].sub(wide.min(axis=1), axis=0) for c, wide in values.items()}
+        for name in tried:
+            model = made.models[name].model
+            row: Row = {"case": case, "model": model.title + " (made the traces)" * (name == maker)}
+            row |= {"parameters": len(model.names), "seeds": len(delta["aic"])}
+            for criterion, each in delta.items():
+                row[f"median_delta_{criterion}"] = each[name].median()
+                row[f"chosen_by_{criterion}"] = (each.idxmin(axis=1) == name).sum()
+            rows.append(row)
+    caption = (
+        "Simplest adequate model: by how much each model's AIC and BIC exceed the lowest, and in "
+        "how many seeds it has the lowest."
+    )
+    return ShownTable(caption, _MODEL_COLUMNS, rows)
+
+
+def read_fits(study: Study, path: Path) -> pd.DataFrame:
+    """Read the fits of every model of a case, in the seeds of a batch."""
+    case = study.cases[path.parent.name]
+    return MODEL_FITS.read(path, case=[case.name], model=case.models, seed=seeds_of(path.stem))
+
+
+_COLUMNS = (
+    *titled("case", "quantity", "unit"),
+    Column("target", "Target", 4),
+    Column("bound_percent", "Cramér-Rao bound, rest known %", 3),
+    Column("spread_percent", "Spread %", 3),
+    Column("spread_over_bound", "Spread / bound", 3),
+    Column("rest_known_over_bound", "The same, rest known", 3),
+    Column("bias_percent", "Bias %", 2),
+    Column("confidence_percent", "Confidence %", 4),
+    Column("coverage_percent", "Intervals that hold the truth %", 3),
+    Column("seeds", "Seeds"),
+    Column("shown_seeds", "Seeds judged in full"),
+    Column("shown_determined", "Determined"),
+    Column("shown_determined_true", "Determined and true"),
+    Column("shown_one_sided", "Bounded on one side"),
+    Column("shown_one_sided_true", "Bounded and true"),
+)
+# Verdicts that are counted together.
+_COUNTED = {"determined": (DETERMINED,), "one_sided": (BOUNDED_BELOW, BOUNDED_ABOVE)}
+
+
+def coverage(
+    study: Study, targets: list[Path], intervals: list[Path], calibrated: list[Path]
+) -> ShownTable:
+    """Compare estimates and intervals of many seeds with the true values and the bound.
+
+    Targets are files of all cases, in their order; calibrated grippers are named like their case.
+    """
+    rows: list[Row] = []
+    estimated = pd.concat([read_intervals(study, it) for it in intervals], ignore_index=True)
+    for (name, case), target in zip(study.cases.items(), targets, strict=True):
+        found = estimated[estimated["case"] == name]
+        own = [file for file in calibrated if file.stem == name]
+        for quantity, limit in bounds_at_truth(case, target, own):
+            mine = found[found["quantity"] == quantity.label]
+            fitted = mine[mine["estimate_rest_known"].notna()]
+            shown = mine[mine["verdict"].notna()]
+            if fitted.empty and not np.any(shown["verdict"] != NOT_DETERMINED):
+                continue
+            truth = quantity_value(quantity.label, case.parameters) or 0.0
+            head = {"case": name, "quantity": quantity.label, "unit": quantity.unit}
+            numbers = _spreads(fitted, truth, 100 * limit, case.confidence) | _shown(shown, truth)
+            rows.append({**head, "target": truth, **numbers})
+    caption = (
+        "Least squares over many seeds, for every quantity that a case's traces should determine: "
+        "standard deviation of the estimates' logarithms beside the Cramér-Rao bound, and how "
+        "often the intervals hold the truth. The bound is for a simpler problem than that of the "
+        "fits: parameters without information in the traces are fixed. Fits search these too; as "
+        "they are near zero they can only be overestimated, at the expense of others: hence the "
+        "bias, and a spread above the bound. Rest known: the spread with these parameters at "
+        "their true values. On the right: verdicts from whole profiles, as users are shown them, "
+        f"in {_judged_seeds(study)}, and how many of them are true; one-sided limits hold more "
+        "often than the confidence says."
+    )
+    return ShownTable(caption, _COLUMNS, rows)
+
+
+def bounds_at_truth(
+    case: Case, target: Path, calibrated: Sequence[Path]
+) -> list[tuple[Quantity, float]]:
+    """Return what is searched of a case, each with its Cramér-Rao bound at the true parameters.
+
+    That is the standard deviation of the quantity's logarithm.
+    """
+    experiment = with_calibration(case.experiment, calibrated)
+    time_s, _, rotation = read_target(target, case.times_s)
+    log_truth = experiment.logs(case.parameters)
+    _, sensitivity = experiment.of(time_s, rotation).residuals(log_truth)
+    noise_sd = standard_deviation(rotation, case.noise)
+    quantities = parameters_and_sum(experiment.searched)
+    return [(each, bound(sensitivity, noise_sd, log_truth, each)) for each in quantities]
+
+
+def read_intervals(study: Study, path: Path) -> pd.DataFrame:
+    """Read the intervals of a batch, which are of the same quantities in each of its seeds.
+
+    Seeds that are judged in full have all quantities.
+    """
+    case, found = study.cases[path.parent.name], INTERVALS.read(path)
+    every = [quantity.label for quantity in parameters_and_sum(case.experiment.searched)]
+    estimated = found.loc[found["estimate_rest_known"].notna(), "quantity"].unique()
+    often = case.block.identifiability.verdicts_every
+    wanted = (
+        (case.name, quantity, seed)
+        for seed in seeds_of(path.stem)
+        for quantity in (estimated if seed % often else every)
+    )
+    require_rows(path, found, ("case", "quantity", "seed"), wanted)
+    return found
+
+
+def _judged_seeds(study: Study) -> str:
+    every = {case.block.identifiability.verdicts_every for case in study.cases.values()}
+    if len(every) > 1:
+        return "some seeds"
+    return "every seed" if 1 in every else f"one of {every.pop()} seeds"
+
+
+def _spreads(found: pd.DataFrame, truth: float, bound: float, confidence: float) -> Row:
+    """Return bound, spread and coverage of a quantity; nothing of one without intervals."""
+    if found.empty:
+        return {}
+    spread, rest_known = (
+        100 * float(np.std(np.log(found[name].to_numpy(float)), ddof=1))
+        for name in ("estimate", "estimate_rest_known")
+    )
+    return {
+        "bound_percent": bound,
+        "spread_percent": spread,
+        "spread_over_bound": spread / bound,
+        "rest_known_over_bound": rest_known / bound,
+        "bias_percent": np.mean(100 * np.log(found["estimate"].to_numpy(float) / truth)),
+        "confidence_percent": 100 * confidence,
+        "coverage_percent": 100 * np.mean(_holds(found, truth)),
+        "seeds": len(found),
+    }
+
+
+def _shown(found: pd.DataFrame, truth: float) -> Row:
+    """Count verdicts from whole profiles, and the true ones among them."""
+    counts: Row = {"shown_seeds": len(found)}
+    held = _holds(found, truth, "shown_")
+    for name, verdicts in _COUNTED.items():
+        chosen = found["verdict"].isin(verdicts)
+        counts[f"shown_{name}"] = int(np.sum(chosen))
+        counts[f"shown_{name}_true"] = int(np.sum(held[chosen]))
+    return counts
+
+
+def _holds(found: pd.DataFrame, truth: float, which: str = "") -> "pd.Series[bool]":
+    """Return whether limits hold the true value, (n_rows,); an open side does."""
+    low, high = found[f"{which}low"].fillna(0.0), found[f"{which}high"].fillna(np.inf)
+    return low.le(truth) & high.ge(truth)
+
+
+_COUNT_COLUMNS = (
+    *titled("case", "quantity", "unit"),
+    Column("target", "Target", 4),
+    *titled("verdict", "seeds"),
+    Column("reached", "With this verdict"),
+    *(Column(f"reached_{end}_percent", f"{end.title()} %") for end in ("from", "to")),
+    Column("narrow", f"Within a factor of {WIDE:g}"),
+    Column("true", "True"),
+    Column("true_percent", "True %"),
+    *(Column(f"true_{end}_percent", f"{end.title()} %") for end in ("from", "to")),
+)
+
+
+def verdict_counts(study: Study, intervals: list[Path]) -> ShownTable:
+    """Count verdicts of whole profiles, and those whose limits hold the true value."""
+    rows: list[Row] = []
+    estimated = pd.concat([read_intervals(study, it) for it in intervals], ignore_index=True)
+    for name, case in study.cases.items():
+        found = estimated[estimated["case"] == name]
+        for quantity in parameters_and_sum(case.experiment.searched):
+            mine = found[(found["quantity"] == quantity.label) & found["verdict"].notna()]
+            target = quantity_value(quantity.label, case.parameters)
+            head: Row = {"case": name, "quantity": quantity.label, "unit": quantity.unit}
+            rows += [head | row for row in _counts(mine, target)]
+    percents = " or ".join(sorted({f"{100 * case.confidence:g}" for case in study.cases.values()}))
+    caption = (
+        f"Verdicts from whole profiles at {percents} %, as users are shown them, in every seed: "
+        "how often each is reached, with the 95 % interval of its share, and how often its limits "
+        "hold the true value, with the 95 % interval of that share (Clopper and Pearson)."
+    )
+    return ShownTable(caption, _COUNT_COLUMNS, rows)
+
+
+def _counts(found: pd.DataFrame, target: float | None) -> Iterator[Row]:
+    for verdict, mine in found.groupby("verdict"):
+        count = len(mine)
+        row: Row = {"target": target, "verdict": verdict, "seeds": len(found), "reached": count}
+        row |= _interval("reached", count, len(found))
+        if verdict == DETERMINED:
+            row["narrow"] = np.sum(mine["shown_high"] <= WIDE**2 * mine["shown_low"])
+        if verdict != NOT_DETERMINED and target is not None:
+            true = int(np.sum(_holds(mine, target, "shown_")))
+            row |= {"true": true, "true_percent": 100 * true / count}
+            row |= _interval("true", true, count)
+        yield row
+
+
+def _interval(name: str, count: int, tried: int) -> Row:
+    """Return the 95 % interval of Clopper and Pearson for a share, in percent."""
+    missed = tried - count
+    low = betaincinv(count, missed + 1, 0.025) if count else 0.0
+    high = betaincinv(count + 1, missed, 0.975) if missed else 1.0
+    return {f"{name}_from_percent": 100 * low, f"{name}_to_percent": 100 * high}
