@@ -199,8 +199,8 @@ def agreed(verdicts: Sequence[str]) -> str:
 
 def _statistics(group: pd.DataFrame) -> dict[str, Any]:
     """Return what evidence may name of a group of rows, whatever the rule."""
-    numbers, every = group.select_dtypes("number"), group.reset_index(drop=True)
-    told = {"rows": len(group), "all": every, "first": {it: every[it].iloc[0] for it in every}}
+    numbers = group.select_dtypes("number")
+    told = {"rows": len(group), "first": {it: group[it].iloc[0] for it in group}}
     told |= {"least": numbers.min(), "median": numbers.median(), "most": numbers.max()}
     return told | {f"p{percent}": numbers.quantile(percent / 100) for percent in (5, 95)}
 
