@@ -274,12 +274,12 @@ def test_bits_are_equal_steps_of_the_logarithm(gray: bool) -> None:
     numbers = np.arange(16)
     written = numbers ^ (numbers >> 1) if gray else numbers
     chromosomes = written[:, None] >> np.arange(4)[::-1] & 1
-    genome = make_genome(MODELS["damper"], {"c_p": genes})
+    genome = make_genome([genes])
     assert (genome.low.tolist(), genome.high.tolist()) == ([0] * 4, [1] * 4)
     found = genome.decode(chromosomes)[:, 0]
     np.testing.assert_allclose(found, np.geomspace(1.1e-4, 9.9e7, 16), rtol=1e-12)
-    np.testing.assert_array_equal(found, genes.values)
-    mixed = make_genome(MAXWELL, RANGES | {"c": genes})
+    np.testing.assert_array_equal(found, encodable_values(genes))
+    mixed = make_genome([STIFFNESS, STIFFNESS, genes, DAMPING])
     assert mixed.sizes == (3, 3, 4, 3)
     rows = np.array([[1, 9, 5, 2, 1, 2, *chromosomes[5], -2, 1, 1]])
     np.testing.assert_allclose(mixed.decode(rows)[0], [9.5, 12, found[5], 0.0011], rtol=1e-12)

@@ -366,8 +366,6 @@ _COMPARED_COLUMNS = (
     Column("median_error_percent", "Median error of a run %", 2),
     Column("median_from_percent", "from", 2),
     Column("median_to_percent", "to", 2),
-    Column("p25", "Quartiles from", 3),
-    Column("p75", "to", 3),
     Column("near_share", "Share near the paper's value", 2),
     Column("near_from", "from", 2),
     Column("near_to", "to", 2),
@@ -387,7 +385,7 @@ def compared(results: Results) -> ShownTable:
         first, row = runs.iloc[0], {"case": case, "quantity": quantity, "reading": reading}
         row |= {name: first[name] for name in ("unit", "target", "printed_from", "printed_to")}
         row |= {f"error_{end}_percent": first[f"printed_error_{end}"] for end in ("from", "to")}
-        row |= {"runs": len(runs), **{f"p{p}": runs["value"].quantile(p / 100) for p in (25, 75)}}
+        row["runs"] = len(runs)
         medians = median_with_limits(runs["error"].to_numpy(float))
         row |= zip((f"median_{n}_percent" for n in ("error", "from", "to")), medians, strict=True)
         near = share_with_limits(int(runs["near"].sum()), len(runs))
@@ -546,7 +544,6 @@ def values_of(case: Case, runs: pd.DataFrame, tables: Mapping[str, pd.DataFrame]
         head |= {"printed_error_to": max(sizes), "sum": len(names) > 1}
         head |= {"determined": expected["expected_verdict"][label] == DETERMINED}
         head |= {"expected_high": expected["expected_high"][label]}
-        head |= {"noise_percent": 100 * case.noise.level}
         kept = runs.filter(["case", "seed", "reading", "judging", "near_noise"])
         rows.append(kept.assign(**head, **columns))
     return pd.concat(rows)
