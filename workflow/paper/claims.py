@@ -21,9 +21,9 @@ import yaml
 from scipy.special import bdtr
 
 from biogrip.arrays import Array
-from biogrip.judging.levels import DETERMINED_PERCENT
 from biogrip.judging.likelihood import bounds_percent
 from biogrip.judging.verdicts import DETERMINED
+from biogrip.levels import DETERMINED_PERCENT
 from biogrip.physics.gripper import ARM_KEYS, Gripper
 from biogrip.physics.noise import Noise, add_noise, rms, standard_deviation, stream
 from biogrip.physics.protocol import sample_times

@@ -22,6 +22,7 @@ from itertools import pairwise
 
 import numpy as np
 
+import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.fit.least_squares import FAIR, FINE, alike
 from biogrip.judging.constrained_fits import CLOSE, ConstrainedFits
@@ -32,10 +33,10 @@ HIGHEST = 16.0
 """Increase of chi^2 up to which a profile has dense points, as figures show no more."""
 
 # Largest difference between neighbours of the square root of the increase, which is nearly linear.
-_STEP = 0.3
-_MOST_ROUNDS = 8
+_ROOT_STEP = 0.3
+_MOST_HALVINGS = 8
 # Improvement of a fit, relative to 1 + increase of chi^2, that has its neighbours fitted again.
-_NEWS = 1e-3
+_LEAST_IMPROVEMENT = 1e-3
 
 
 class Points:
@@ -96,15 +97,17 @@ class Points:
         new = self.values[left + 1] != values
         self._add(left[new], values[new])
         self._deepen(np.flatnonzero(np.isin(self.values, values[new])))
-        for _ in range(_MOST_ROUNDS):
+        for _ in range(_MOST_HALVINGS):
             roots = np.sqrt(np.clip(self.increases, 0.0, HIGHEST))
-            left = np.flatnonzero((np.abs(np.diff(roots)) > _STEP) & (np.diff(self.profile) == 0))
+            left = np.flatnonzero(
+                (np.abs(np.diff(roots)) > _ROOT_STEP) & (np.diff(self.profile) == 0)
+            )
             self._add(left, 0.5 * (self.values[left] + self.values[left + 1]))
 
     def _deepen(self, limits: IntArray) -> None:
         """Fit limits above the threshold from the ends of all profiles, and their neighbours."""
         profile = self.profile[limits]
-        missed = self.increases[limits] > _CLEARLY * self.fits.threshold[profile]
+        missed = self.increases[limits] > levels.GAP * self.fits.threshold[profile]
         limits, profile = limits[missed], profile[missed]
         if not len(limits):
             return
@@ -134,19 +137,17 @@ def keep_lower(
     for at, increase, parameters in zip(point.tolist(), found.tolist(), fitted, strict=True):
         before = increases[at]
         if increase < before:
-            news[at] |= increase < before - _NEWS * (1 + abs(increase))
+            news[at] |= increase < before - _LEAST_IMPROVEMENT * (1 + abs(increase))
             increases[at], x[at] = increase, parameters
     return news
 
 
 # Points near the best fit, in standard deviations, that every profile has.
-_NEAR = np.array([z for z in np.arange(-4.0, 4.1, 0.5) if z != 0])
-_POINTS = 35
+_NEAR_OPTIMUM = np.array([z for z in np.arange(-4.0, 4.1, 0.5) if z != 0])
+_EVENLY = 35
 # Points closer to the optimum than this are left out.
-_APART = 1e-9
-_ACCURACY = 1e-5
-# Factor by which a gap exceeds the threshold: fits give chi^2 with an error of about 0.01.
-_CLEARLY = 1.01
+_LEAST_GAP_OF_POINTS = 1e-9
+_ROOT_ERROR = 1e-5
 
 
 @dataclass(frozen=True)
@@ -190,11 +191,11 @@ def compute_profiles(
 
 
 def _profiles(fits: ConstrainedFits, *, smooth: bool) -> list[Profile]:
-    grids = [_grid(each, quantity) for each in fits.likelihoods for quantity in fits.quantities]
+    grids = [_grid_of(each, quantity) for each in fits.likelihoods for quantity in fits.quantities]
     points = Points(fits, grids)
     points.from_optimum()
     points.from_neighbours()
-    limits = _limits(points).T
+    limits = _find_crossings(points).T
     if smooth:
         points.smooth(limits)
     found = []
@@ -221,17 +222,17 @@ def _profiles(fits: ConstrainedFits, *, smooth: bool) -> list[Profile]:
     return found
 
 
-def _grid(likelihood: Likelihood, quantity: Quantity) -> Array:
+def _grid_of(likelihood: Likelihood, quantity: Quantity) -> Array:
     """Return ascending values over a quantity's whole range, denser near the optimum."""
     low, high = quantity.range(likelihood.problem.low, likelihood.problem.high)
     start = quantity.log(likelihood.best)
-    near = start + likelihood.deviation(quantity) * _NEAR
-    others = np.concatenate((near[(near > low) & (near < high)], np.linspace(low, high, _POINTS)))
+    near = start + likelihood.deviation(quantity) * _NEAR_OPTIMUM
+    others = np.concatenate((near[(near > low) & (near < high)], np.linspace(low, high, _EVENLY)))
     # Rounding must not make two points of an optimum that lies at an end.
-    return np.unique(np.append(others[np.abs(others - start) > _APART], start))
+    return np.unique(np.append(others[np.abs(others - start) > _LEAST_GAP_OF_POINTS], start))
 
 
-def _limits(points: Points) -> Array:
+def _find_crossings(points: Points) -> Array:
     """Find the limits, where profiles cross the threshold, (2, n_profiles); NaN without limit."""
     fits, ends = points.fits, points.ends()
     crossed = np.full(ends.shape, np.nan)
@@ -255,7 +256,7 @@ def _limits(points: Points) -> Array:
 
 
 # Most fits for a crossing, and the width of an interval in which a profile jumps.
-_MOST_FITS, _CLOSEST = 40, 1e-7
+_MOST_FITS_OF_CROSSING, _WIDTH_OF_JUMP = 40, 1e-7
 
 
 def crossings(
@@ -281,7 +282,7 @@ def crossings(
     moved = np.full(len(profile), -1)
     found = ends[1].copy()
     left = np.arange(len(profile))
-    for tries in range(_MOST_FITS):
+    for tries in range(_MOST_FITS_OF_CROSSING):
         if not len(left):
             break
         share = excess[0, left] / (excess[0, left] - excess[1, left])
@@ -296,7 +297,7 @@ def crossings(
         reached, fitted = fits.from_each(profile[left], tried, starts, FINE)
         over = np.sqrt(np.maximum(np.min(reached, axis=0), 0.0)) - root_threshold[left]
         # A basin deeper than that of the outer end may be deeper at the outer end, too.
-        missed = np.sqrt(np.maximum(reached[2], 0.0)) - root_threshold[left] > over + _ACCURACY
+        missed = np.sqrt(np.maximum(reached[2], 0.0)) - root_threshold[left] > over + _ROOT_ERROR
         if np.any(missed):
             outer = left[missed]
             beyond = fits.at(profile[outer], values[1, outer], fitted[missed], FINE)
@@ -310,8 +311,8 @@ def crossings(
         excess[1 - side[again], left[again]] *= 0.5
         moved[left] = side
         # Where a deeper basin begins, the increase may jump past the threshold.
-        apart = np.abs(ends[1, left] - ends[0, left]) > _CLOSEST
-        left = left[(np.abs(over) > _ACCURACY) & apart & ~void]
+        apart = np.abs(ends[1, left] - ends[0, left]) > _WIDTH_OF_JUMP
+        left = left[(np.abs(over) > _ROOT_ERROR) & apart & ~void]
     return found
 
 
@@ -322,7 +323,7 @@ def find_gaps(
     roots = np.sqrt(np.maximum(increases, 0.0))
     found = []
     for start, end in pairwise(np.flatnonzero(increases < threshold).tolist()):
-        if end > start + 1 and increases[start + 1 : end].max() > _CLEARLY * threshold:
+        if end > start + 1 and increases[start + 1 : end].max() > levels.GAP * threshold:
             # Places for `np.interp` ascend from inside to outside.
             sides = [start, start + 1], [end, end - 1]
             first, last = (np.interp(np.sqrt(threshold), roots[of], log_values[of]) for of in sides)
