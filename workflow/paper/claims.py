@@ -55,7 +55,7 @@ CLOSE, NEAR = 0.05, 0.1
 """Relative differences up to which a rounded number, and an identified value, is the paper's."""
 AROUND = 10
 """Generations about the paper's that are still around it."""
-NOISE = 0.1
+PAPERS_NOISE = 0.1
 """The paper's noise, as a share of the peak."""
 REFUTED = 10
 """Rise of BIC from which a model is refuted."""
@@ -200,7 +200,7 @@ def agreed(verdicts: Sequence[str]) -> str:
 def _statistics(group: pd.DataFrame) -> dict[str, Any]:
     """Return what evidence may name of a group of rows, whatever the rule."""
     numbers = group.select_dtypes("number")
-    told = {"rows": len(group), "first": {it: group[it].iloc[0] for it in group}}
+    told = {"rows": len(group), "first": {column: group[column].iloc[0] for column in group}}
     told |= {"least": numbers.min(), "median": numbers.median(), "most": numbers.max()}
     return told | {f"p{percent}": numbers.quantile(percent / 100) for percent in (5, 95)}
 
@@ -421,9 +421,9 @@ def read_results(
     runs: dict[str, list[pd.DataFrame]] = {}
     for case, found, best in zip(study.cases.values(), identifications, histories, strict=True):
         if study.shown_method.name == "genetic":
-            for at, own in read_runs(case, found, best).items():
+            for at, runs_of_text in read_runs(case, found, best).items():
                 others = [file for file in read if file.parent.name == case.name and not at]
-                both = [own.assign(judging=not others)]
+                both = [runs_of_text.assign(judging=not others)]
                 both += [read_reading(study, tables.get("readings"), file) for file in others]
                 every = pd.concat(both, ignore_index=True).assign(case=case.name)
                 if not at:
@@ -490,7 +490,7 @@ def _by_noise(rows: pd.DataFrame) -> Row:
     at = rows.groupby("row")["error_genetic"].median()
     power = np.polyfit(np.log(at.index), np.log(at), 1)[0]
     over = (rows["error_genetic"] / (0.6745 * rows["bound_percent"])).groupby(rows["row"]).median()
-    sizes = {"first": at.iloc[0], "last": at.iloc[-1], "paper": at.get(100 * NOISE, np.nan)}
+    sizes = {"first": at.iloc[0], "last": at.iloc[-1], "paper": at.get(100 * PAPERS_NOISE, np.nan)}
     ends = {"first_noise": at.index[0], "last_noise": at.index[-1], "over_bound": over.max()}
     return {"power": round(power, 2) + 0.0} | sizes | ends
 

@@ -89,8 +89,10 @@ def read(study: Study, files: list[Path]) -> Found:
     for path in files:
         rows = read_readings(path, study.cases[path.parent.name])
         found.setdefault(path.parent.name, []).append(rows)
-    every = {name: pd.concat(rows, ignore_index=True) for name, rows in found.items()}
-    return {name: it.assign(**{"c + c_p": it["c"] + it["c_p"]}) for name, it in every.items()}
+    joined = {name: pd.concat(rows, ignore_index=True) for name, rows in found.items()}
+    return {
+        name: runs.assign(**{"c + c_p": runs["c"] + runs["c_p"]}) for name, runs in joined.items()
+    }
 
 
 def printable(study: Study, reading: str) -> dict[str, int]:
@@ -163,7 +165,7 @@ def _factor(kernel: Array, width: float) -> tuple[float, float, int]:
     return float(np.log10(mean / width)), variance / np.log(10) ** 2, count
 
 
-def compare(mine: Factors, base: Factors, without: int = 0) -> tuple[float, float]:
+def likelihood_ratio(mine: Factors, base: Factors, without: int = 0) -> tuple[float, float]:
     """Return log10 of the ratio of two likelihoods, of all tables but one, and its error."""
     kept = [key for key in base if key[0] != without]
     ratio = sum(mine[key][0] - base[key][0] for key in kept)
@@ -177,7 +179,9 @@ def readings(study: Study, found: Found) -> ShownTable:
     base = factors(study, found, first)
     for name, reading in study.config.readings.items():
         mine = base if name == first else factors(study, found, name)
-        (all_of, error), (alone, error_alone) = (compare(mine, base, it) for it in (0, SHARED))
+        (all_of, error), (alone, error_alone) = (
+            likelihood_ratio(mine, base, table) for table in (0, SHARED)
+        )
         table, quantity = min(base, key=lambda key: mine[key][0] - base[key][0])
         row: Row = {"reading": reading.title, **printable(study, name)}
         row |= {"likelihood": all_of, "likelihood_error": error}
