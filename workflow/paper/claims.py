@@ -293,9 +293,8 @@ def _at_contact(results: Results, gripper: Gripper) -> Iterator[Gripper]:
         yield replace(gripper, reference_angle_deg=float(angle))
 
 
-def _devices(results: Results, gripper: Gripper) -> Iterator[Gripper]:
+def _devices(_: Results, gripper: Gripper) -> Iterator[Gripper]:
     """Yield grippers with arms of two thirds to four thirds the length, half to twice as stiff."""
-    del results
     for factor in (2 / 3, 4 / 3):
         yield replace(gripper, arm_length_m=factor * gripper.arm_length_m)
     for factor in (0.5, 2.0):

@@ -246,8 +246,7 @@ def draw_referee(study: Study, found: Found, compared: ShownTable) -> Figure:
         first.errorbar(max(row["likelihood"], _LEFT), place, xerr=spread, fmt="o", **look)
         for case, rows in _of(study, found, name):
             table = case.published.table
-            middle = min(rows["last_improvement"].median(), _LAST)
-            last.plot(middle, place, _MARKS[table], **look)
+            last.plot(min(rows["last_improvement"].median(), _LAST), place, _MARKS[table], **look)
             for axes, (of, quantity, most, _) in zip(claims, _PANELS, strict=True):
                 if of == table:
                     off = 100 * np.abs(rows[quantity] / case.parameters[quantity] - 1)
