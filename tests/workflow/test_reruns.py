@@ -13,6 +13,8 @@ TOLD = {"tables": 1, "claims": 1, "page": 1}
 STUDY = TOLD | {"figures": 1, "evidence": 1}
 # Of a simulated case, from its traces to their judgement, with one batch of them.
 TRACES = {"measurement": 1, "identification": 2, "model_fits": 1, "intervals": 1, "judgement": 1}
+# Of a case of the paper, under the other encoding.
+READ = {"readings_of_case": 1}
 # Of a simulated case and of a recorded trace.
 RECORDED = {"case_tables": 2, "case_figures": 1, "recorded_case_figures": 1}
 CELL = {"sample": {"model": "liquid_drop", "k": 20.0, "k_p": 5.0, "c": 80.0}}
@@ -24,7 +26,7 @@ LEVELS = {
 CHANGES: dict[str, tuple[dict[str, Any], dict[str, int]]] = {
     "noise": (
         {"measurement": {"noise": {"level": 0.2}}},
-        TRACES | {"recorded_judgement": 1, "mechanics": 1} | RECORDED | STUDY,
+        TRACES | READ | {"recorded_judgement": 1, "mechanics": 1} | RECORDED | STUDY,
     ),
     "models to compare": (
         {"model_selection": {"models": ["maxwell"]}},
@@ -36,12 +38,14 @@ CHANGES: dict[str, tuple[dict[str, Any], dict[str, int]]] = {
         {"target": 1, "mechanics": 1, "linearisation": 1, "case_tables": 2, "case_figures": 2}
         | {"gripper_figures": 1}
         | TRACES
+        | READ
         | STUDY,
     ),
     "seeds": (
         {"seeds": 7},
         {"measurement": 3, "identification": 6, "model_fits": 3, "mechanics": 1}
         | {"case_tables": 1, "case_figures": 1}
+        | READ
         | STUDY,
     ),
     "what is read of a recorded trace": (
@@ -55,6 +59,7 @@ CHANGES: dict[str, tuple[dict[str, Any], dict[str, int]]] = {
         {"genetic_algorithm": {"max_generations": 5}, "sweeps": {"levels": LEVELS}},
         # Evidence reads traces alone.
         {"identification": 6, "target": 2, "measurement": 2, "sweep": 1}
+        | READ
         | RECORDED
         | {rule: 1 for rule in STUDY if rule != "evidence"},
     ),
