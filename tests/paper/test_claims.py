@@ -256,7 +256,7 @@ def test_jaws_that_would_have_to_pull_hold_one_sample_in_three() -> None:
 def test_the_cell_model_need_not_be_assumed_where_the_general_one_fits() -> None:
     rows = [
         {"case": case, "of_table": table, "seeds": 50, "model": model, "parameters": parameters}
-        | {"median_delta_bic": bic, "chosen_by_bic": 7}
+        | {"median_delta_bic": bic, "median_delta_aic": bic, "chosen_by_bic": 7}
         for case, table, most in zip("abc", (5, 6, 7), (11, 9, 9), strict=True)
         for model, parameters, bic in (
             *(("damper", 1, 99.0), ("drop", 3, 2.0)),
@@ -267,7 +267,7 @@ def test_the_cell_model_need_not_be_assumed_where_the_general_one_fits() -> None
     claims.add_columns(tables)
     found = claims.judge(claim("nor the specific"), claims.Results(seen(), tables))
     assert [verdict for _, verdict, _ in found] == [NOT, REPLICATED, REPLICATED]
-    assert "refutes 1 of 2 simpler ones" in found[0][2]
+    assert "refute 1 of 2 simpler ones" in found[0][2]
 
 
 def test_what_the_study_lacks_is_another_config_s_to_judge() -> None:

@@ -236,7 +236,6 @@ def test_printed_values_are_counted_that_genes_hold() -> None:
     counts = {reading: readings.printable(ALL, reading) for reading in exactly}
     assert {reading: own["exactly"] for reading, own in counts.items()} == exactly
     for reading, own in counts.items():
-        assert own["with_error"] <= own["rounded"] >= own["exactly"]
         assert (own["values"], own["with_error"] == 12) == (12, reading == "four_from_0")
     assert readings.able(ALL) == "four_from_0"
 
@@ -309,8 +308,6 @@ def test_what_readings_find_is_told(given: tuple[Study, Any]) -> None:
     assert {first["verdict"], second["verdict"]} == {"too few runs"}
     of_first, of_second = readings.found_by_readings(study, found).rows
     assert (of_first["near_noise_share"], of_second["near_noise_share"]) == (1, 0.25)
-    # Within 2.7 % in k and 0.26 % in c + c_p; the other two miss k by 2.4 %.
-    assert (of_first["as_close_share"], of_second["as_close_share"]) == (1, 0.25)
     assert of_first["last_improvement"] == 63.5
 
 

@@ -93,16 +93,6 @@ def test_a_wrong_block_of_the_study_is_said_once_and_not_of_every_case(tmp_path:
     assert "my.yaml, line 2: protocol: found 5" in said[1]
 
 
-@pytest.mark.parametrize(
-    ("fixed", "trade"), [("k_p: 1.0", True), ("k: 1.0, k_p: 1.0", False), ("c_p: 0.1", False)]
-)
-def test_two_dampers_trade_beside_another_that_is_searched(
-    tmp_path: Path, fixed: str, trade: bool
-) -> None:
-    study = load(tmp_path, f"cases: {{endothelial_cell: {{fixed: {{{fixed}}}}}}}")
-    assert study.cases["endothelial_cell"].has_trade_off is trade
-
-
 def test_all_problems_are_said_once_and_many_are_cut_short(tmp_path: Path) -> None:
     said = refusal(tmp_path, "gripper: {arm_length_m: -1}\nseedz: 3\nmethods: [gentic]")
     keys = ("arm_length_m: found", "seedz: ", "methods[0]")

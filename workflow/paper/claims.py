@@ -55,7 +55,7 @@ CLOSE, NEAR = 0.05, 0.1
 """Relative differences up to which a rounded number, and an identified value, is the paper's."""
 AROUND = 10
 """Generations about the paper's that are still around it."""
-NOISE = 0.1
+PAPERS_NOISE = 0.1
 """The paper's noise, as a share of the peak."""
 REFUTED = 10
 """Rise of BIC from which a model is refuted."""
@@ -199,8 +199,8 @@ def agreed(verdicts: Sequence[str]) -> str:
 
 def _statistics(group: pd.DataFrame) -> dict[str, Any]:
     """Return what evidence may name of a group of rows, whatever the rule."""
-    numbers, every = group.select_dtypes("number"), group.reset_index(drop=True)
-    told = {"rows": len(group), "all": every, "first": {it: every[it].iloc[0] for it in every}}
+    numbers = group.select_dtypes("number")
+    told = {"rows": len(group), "first": {column: group[column].iloc[0] for column in group}}
     told |= {"least": numbers.min(), "median": numbers.median(), "most": numbers.max()}
     return told | {f"p{percent}": numbers.quantile(percent / 100) for percent in (5, 95)}
 
@@ -293,9 +293,8 @@ def _at_contact(results: Results, gripper: Gripper) -> Iterator[Gripper]:
         yield replace(gripper, reference_angle_deg=float(angle))
 
 
-def _devices(results: Results, gripper: Gripper) -> Iterator[Gripper]:
+def _devices(_: Results, gripper: Gripper) -> Iterator[Gripper]:
     """Yield grippers with arms of two thirds to four thirds the length, half to twice as stiff."""
-    del results
     for factor in (2 / 3, 4 / 3):
         yield replace(gripper, arm_length_m=factor * gripper.arm_length_m)
     for factor in (0.5, 2.0):
@@ -366,8 +365,6 @@ _COMPARED_COLUMNS = (
     Column("median_error_percent", "Median error of a run %", 2),
     Column("median_from_percent", "from", 2),
     Column("median_to_percent", "to", 2),
-    Column("p25", "Quartiles from", 3),
-    Column("p75", "to", 3),
     Column("near_share", "Share near the paper's value", 2),
     Column("near_from", "from", 2),
     Column("near_to", "to", 2),
@@ -387,7 +384,7 @@ def compared(results: Results) -> ShownTable:
         first, row = runs.iloc[0], {"case": case, "quantity": quantity, "reading": reading}
         row |= {name: first[name] for name in ("unit", "target", "printed_from", "printed_to")}
         row |= {f"error_{end}_percent": first[f"printed_error_{end}"] for end in ("from", "to")}
-        row |= {"runs": len(runs), **{f"p{p}": runs["value"].quantile(p / 100) for p in (25, 75)}}
+        row["runs"] = len(runs)
         medians = median_with_limits(runs["error"].to_numpy(float))
         row |= zip((f"median_{n}_percent" for n in ("error", "from", "to")), medians, strict=True)
         near = share_with_limits(int(runs["near"].sum()), len(runs))
@@ -423,9 +420,9 @@ def read_results(
     runs: dict[str, list[pd.DataFrame]] = {}
     for case, found, best in zip(study.cases.values(), identifications, histories, strict=True):
         if study.shown_method.name == "genetic":
-            for at, own in read_runs(case, found, best).items():
+            for at, runs_of_text in read_runs(case, found, best).items():
                 others = [file for file in read if file.parent.name == case.name and not at]
-                both = [own.assign(judging=not others)]
+                both = [runs_of_text.assign(judging=not others)]
                 both += [read_reading(study, tables.get("readings"), file) for file in others]
                 every = pd.concat(both, ignore_index=True).assign(case=case.name)
                 if not at:
@@ -492,7 +489,7 @@ def _by_noise(rows: pd.DataFrame) -> Row:
     at = rows.groupby("row")["error_genetic"].median()
     power = np.polyfit(np.log(at.index), np.log(at), 1)[0]
     over = (rows["error_genetic"] / (0.6745 * rows["bound_percent"])).groupby(rows["row"]).median()
-    sizes = {"first": at.iloc[0], "last": at.iloc[-1], "paper": at.get(100 * NOISE, np.nan)}
+    sizes = {"first": at.iloc[0], "last": at.iloc[-1], "paper": at.get(100 * PAPERS_NOISE, np.nan)}
     ends = {"first_noise": at.index[0], "last_noise": at.index[-1], "over_bound": over.max()}
     return {"power": round(power, 2) + 0.0} | sizes | ends
 
@@ -546,7 +543,6 @@ def values_of(case: Case, runs: pd.DataFrame, tables: Mapping[str, pd.DataFrame]
         head |= {"printed_error_to": max(sizes), "sum": len(names) > 1}
         head |= {"determined": expected["expected_verdict"][label] == DETERMINED}
         head |= {"expected_high": expected["expected_high"][label]}
-        head |= {"noise_percent": 100 * case.noise.level}
         kept = runs.filter(["case", "seed", "reading", "judging", "near_noise"])
         rows.append(kept.assign(**head, **columns))
     return pd.concat(rows)

@@ -49,9 +49,9 @@ def protocols(study: Study, identifications: list[Path]) -> ShownTable:
     """Compare what traces of every protocol tell, by bounds and by blind identifications."""
     rows, density = list[Row](), 1.0
     for case, found in _pairs(study, identifications):
-        own = _noise_rad(case) / np.sqrt(case.block.measurement.rate_Hz)
-        density = own if case.published.table else density
-        rows += _rows(case, found, own, density)
+        noise = _noise_rad(case) / np.sqrt(case.block.measurement.rate_Hz)
+        density = noise if case.published.table else density
+        rows += _rows(case, found, noise, density)
     caption = (
         "The paper's samples under its own protocol and under others: the lowest force of the "
         "jaws, negative where they would have to pull; the Cramér-Rao bound at the case's noise, "

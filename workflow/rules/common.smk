@@ -103,12 +103,18 @@ def names(cases):
     return "|".join(cases) or "(?!)"
 
 
+def trades(case):
+    """True if two exchangeable parameters are searched, and others besides."""
+    pair = {*case.sample.model.exchangeable}
+    return len(pair) == 2 and pair < {parameter.name for parameter in case.block.searched}
+
+
 # Cases that have what only some have, those of sweeps' points among them.
 SIMULATED = [*STUDY.simulated, *STUDY.points]
 EVERY = [*STUDY.cases, *STUDY.points]
 CALIBRATED = [n for n in EVERY if STUDY.case(n).block.assumed_gripper == "calibrated"]
 SELECTING = list(STUDY.cases) if STUDY.config.model_selection.models else []
-ANSWERED = [name for name in STUDY.gripped if STUDY.case(name).has_trade_off][-1:]
+ANSWERED = [name for name in STUDY.gripped if trades(STUDY.case(name))][-1:]
 calibration_of = of_case("results/calibrations/{case}.yaml", CALIBRATED)
 
 # Tables and figures of the study, of what there is in it, and those of a case.

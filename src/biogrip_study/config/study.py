@@ -75,13 +75,6 @@ class Case(SampleCase):
             return built(Gripper, overlaid(plain(self.gripper), assumed))
         return self.gripper
 
-    @property
-    def has_trade_off(self) -> bool:
-        """True if two exchangeable parameters are searched, and others besides."""
-        searched = [parameter.name for parameter in self.block.searched]
-        pair = {*self.sample.model.exchangeable} & {*searched}
-        return len(pair) == 2 and len(searched) > 2
-
 
 @dataclass(frozen=True)
 class Study:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import product
 from typing import Any
 
@@ -54,7 +54,7 @@ class Genome:
         for parameter, genes in self.binary:
             first = self._exponents[parameter]
             bits = chromosomes[..., first : first + genes.bits]
-            parameters[..., parameter] = of_bits(genes, bits)
+            parameters[..., parameter] = _of_bits(genes, bits)
         return parameters
 
     def keys(self, chromosomes: Chromosomes) -> list[Array]:
@@ -106,10 +106,11 @@ def make_genome(ranges: Sequence[GeneRange]) -> Genome:
     return Genome(low, high, sizes, tuple((i, g) for i, g in enumerate(ranges) if g.bits))
 
 
+@cache
 def encodable_values(genes: GeneRange) -> Array:
     """Return all positive values that genes can encode, ascending, each the nearest double."""
     if genes.bits:
-        return _at_equal_steps(genes, np.arange(2**genes.bits))
+        return np.geomspace(genes.low, genes.high, 2**genes.bits)
     mantissas = np.zeros(1)
     for least, most in zip(genes.least[1:], genes.most[1:], strict=True):
         mantissas = (10 * mantissas[:, None] + np.arange(least, most + 1)).ravel()
@@ -118,16 +119,10 @@ def encodable_values(genes: GeneRange) -> Array:
     return np.unique(values[values > 0]) if genes.least[1] == 0 else values.ravel()
 
 
-def of_bits(genes: GeneRange, bits: Chromosomes) -> Array:
+def _of_bits(genes: GeneRange, bits: Chromosomes) -> Array:
     """Decode bits, (..., n_bits), the largest first, into a value each."""
     plain = np.bitwise_xor.accumulate(bits, axis=-1) if genes.gray else bits
-    return _at_equal_steps(genes, plain @ (1 << np.arange(genes.bits)[::-1]))
-
-
-def _at_equal_steps(genes: GeneRange, numbers: IntArray) -> Array:
-    low, high = np.log([genes.low, genes.high])
-    values: Array = np.exp(low + (high - low) * numbers / (2**genes.bits - 1))
-    return values
+    return encodable_values(genes)[plain @ (1 << np.arange(genes.bits)[::-1])]
 
 
 def nearest_encodable(value: float, genes: GeneRange) -> float:
