@@ -70,10 +70,8 @@ def test_a_page_begins_with_status_value_and_interval(example: Outcome, tmp_path
     unfolded = re.sub("<details>.*?</details>", "", text, flags=re.DOTALL)
     assert "search_range:" in text
     assert "search_range:" not in unfolded
-    assert r"95\,\%" not in unfolded
     lines = for_a_paper(example.found[0])
-    assert len(lines) == sum(f"<p>{line}</p>" in text for line, _ in lines) == 6
-    assert r"$k_{p}$ = 5.01 N/m (95 \% profile-likelihood interval " in text
+    assert len(lines) == sum(f"<p>{line}</p>" in text for line in lines) == 6
 
 
 def test_pictures_are_small_and_in_the_page(page: Path) -> None:
@@ -138,10 +136,6 @@ def test_the_methods_have_the_numbers_of_the_study(page: Path) -> None:
         "Something is odd). Not identified: 1 (bad.csv: found 'high'). Computed with biogrip 1.0.0",
     ):
         assert words in said
-    latex = text.partition("<pre>")[2].partition("</pre>")[0]
-    assert r"$1.6 \times 10^{-9}$ N m" in latex
-    assert r"95 \% profile-likelihood" in latex
-    assert not re.search(r"(?<!\\)[%_#&]", latex)
 
 
 def test_of_very_many_traces_there_is_the_table_and_the_page_says_so(

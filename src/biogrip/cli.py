@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from biogrip import __version__
-from biogrip.command.options import GROUPS, Setting
+from biogrip.command.options import GROUPS, REPLACED, Setting
 from biogrip.errors import BiogripError, nearest
 from biogrip.terminal import visible, visible_lines
 
@@ -72,7 +72,10 @@ class _Parser(argparse.ArgumentParser):
         """Refuse unknown options with the usage of their command, and the nearest that there is."""
         parsed, unknown = super().parse_known_args(args, namespace)
         if unknown:
-            near = nearest(unknown[0].partition("=")[0], self._option_string_actions)
+            option = unknown[0].partition("=")[0]
+            if new := REPLACED.get(option.removeprefix("--")):
+                self.error(f"{option}: is now --{new}, as in --{new} 'sphere 2.5 um'.")
+            near = nearest(option, self._option_string_actions)
             self.error(f"unrecognized arguments: {' '.join(unknown)}.{near}")
         return parsed, unknown
 
@@ -86,14 +89,14 @@ def _model_lines() -> list[str]:
     from biogrip.physics.models import ALIASES, MODELS
 
     width = max(map(len, MODELS))
-    lines = ["", "sample models (other names; prony3: generalized_maxwell_3 without c_p):"]
+    lines = ["", "sample models (other names; prony3, sls3: generalized_maxwell_3 without c_p):"]
     shown = {ALIASES.get(name, name): name for name in _USUAL}
     shown |= {name: name for name in MODELS if name not in shown}
     for name, usual in shown.items():
         others = [other for other in (*ALIASES, *MODELS) if ALIASES.get(other, other) == name]
         also = ", ".join(other for other in others if other != usual)
         lines.append(f"  {usual:<{width}}  {MODELS[name].title}" + (f" ({also})" if also else ""))
-    return lines
+    return [*lines, f"  {'jeffreys':<{width}}  Burgers fluid without its spring"]
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -173,7 +176,7 @@ def _add_identify(commands: Any) -> None:
         "identify cell.csv --config my_gripper.yaml --model liquid_drop --report page.html",
         "identify creep.csv --reading 'strain=Strain [%]' --time 'Time [s]' --hold 5Pa --model sls",
         "identify afm.txt --reading 'force=Load (uN)' --time 'Time (s)' "
-        "--load 'Indentation (nm)' --sphere '25 um' --model sls",
+        "--load 'Indentation (nm)' --shape 'sphere 25 um' --model sls",
         """identify sweep.csv --reading "storage=G' (Pa)" --reading "loss=G'' (Pa)" """
         "--frequency 'f (Hz)' --model power_law",
         "identify cells.tsv --config my_gripper.yaml --csv found.csv",

@@ -20,7 +20,7 @@ from biogrip.command.outputs import Outcome, table_of
 from biogrip.command.settings import MODEL, Asked, read_trace
 from biogrip.command.words import in_words
 from biogrip.config.loading import default_ranges
-from biogrip.config.source import HOLD
+from biogrip.config.source import HOLD, RAMP
 from biogrip.errors import BiogripError
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import identify_many
@@ -50,6 +50,7 @@ one_blas_thread: Callable[[_Function], _Function] = threadpool_limits.wrap(
 _ARGUMENTS = (
     ("--reading loss=COLUMN", "loss=..."),
     ("--start fit", 'start="fit"'),
+    ("--ramp DURATION", "ramp=..."),
     ("--offset --drift", "offset=True, drift=True"),
     ("--(offset|drift)", r"\1=True"),
     (r"--model (\w+)", r'model="\1"'),
@@ -148,6 +149,7 @@ def identify_trace(
     reads: str = GRIPPER.read.name,
     model: str = MODEL,
     hold: float | str | None = None,
+    ramp: float | None = None,
     start: float | str | None = None,
     sd: ArrayLike | None = None,
     loss: ArrayLike | None = None,
@@ -174,6 +176,8 @@ def identify_trace(
     hold
         What is held from 0 to the end, in SI units or with its unit, as ``"20 pN"``, unless
         ``config`` has the protocol.
+    ramp
+        Time in s within which it was reached, linearly and from its start on; by default at once.
     start
         Start of the protocol on the clock of `time_s`, in s, or ``"fit"``.
     sd : (n_samples,), optional
@@ -220,6 +224,7 @@ def identify_trace(
         *(("config", block, value) for block, value in (config or {}).items()),
         ("model", "sample.model", model),
         ("hold", *HOLD, hold),
+        ("ramp", *RAMP, ramp),
         ("reads", f"measurement.{reads}", column),
         ("loss", "measurement.loss", None if loss is None else beside),
         ("start", f"measurement.{onset[0]}", onset[1]),

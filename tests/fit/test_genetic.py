@@ -271,7 +271,7 @@ def test_bits_are_equal_steps_of_the_logarithm(gray: bool) -> None:
     found = genome.decode(chromosomes)[:, 0]
     np.testing.assert_allclose(found, np.geomspace(1.1e-4, 9.9e7, 16), rtol=1e-12)
     np.testing.assert_array_equal(found, encodable_values(genes))
-    mixed = make_genome([STIFFNESS, STIFFNESS, genes, DAMPING])
+    mixed = make_genome([(RANGES | {"c": genes})[p.range_name] for p in MAXWELL.parameters])
     assert mixed.sizes == (3, 3, 4, 3)
     rows = np.array([[1, 9, 5, 2, 1, 2, *chromosomes[5], -2, 1, 1]])
     np.testing.assert_allclose(mixed.decode(rows)[0], [9.5, 12, found[5], 0.0011], rtol=1e-12)

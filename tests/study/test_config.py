@@ -295,3 +295,8 @@ def test_whatever_is_added_changes_no_other_point(tmp_path: Path) -> None:
         assert old in SWEEP
         after = load(tmp_path, SWEEP.replace(old, new)).points
         assert {name: after[name].plain for name in before} == before
+
+
+def test_a_wrong_block_of_the_study_is_told_once(tmp_path: Path) -> None:
+    """Below a headline, and not once more of each of the three cases, which inherit it."""
+    assert refusal(tmp_path, "protocol: 5").count("\n") == 1

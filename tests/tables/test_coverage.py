@@ -14,7 +14,7 @@ from biogrip_study.records.identifications import INTERVALS
 from biogrip_study.stages import judgement as stage
 from biogrip_study.stages import targets
 from biogrip_study.tables.layout import Column, ShownTable, convert, write
-from biogrip_study.tables.study import coverage, verdict_counts
+from biogrip_study.tables.study import bounds_at_truth, coverage, verdict_counts
 from tests.helpers.default import study_of
 from tests.helpers.problems import MODEL, TORQUE, rotation
 
@@ -195,3 +195,30 @@ def test_markup_is_text_in_every_format(tmp_path: Path) -> None:
         assert [len(re.findall(r"(?<!\\)\|", row)) for row in markdown.splitlines()[-3:]] == [2] * 3
         assert "<img" not in markdown + page
         assert read_rows(tmp_path / "t.csv") == [["a"], [given]]
+
+
+def test_the_bound_of_a_case_is_of_its_own_calibration(tmp_path: Path) -> None:
+    """An arm a thousand times stiffer leaves less of a cell to be seen."""
+    study = study_of("{measurement: {rate_Hz: 1.0}, cases: {endothelial_cell: null}}")
+    arm = study.cases[CASE].gripper.left
+    files, of_targets, batches = [], [], []
+    for name, times in (("liquid_drop_1", 1.0), (CASE, 1000.0)):
+        stiff = replace(arm, stiffness_Nm_per_rad=times * arm.stiffness_Nm_per_rad)
+        files.append(tmp_path / f"{name}.yaml")
+        files[-1].write_text(calibration_yaml(*[CalibratedArm(stiff, arm)] * 2))
+        of_targets.append(tmp_path / f"{name}.csv")
+        targets.simulate_target(study.cases[name], of_targets[-1])
+        batches.append(tmp_path / name / "seeds_0-1.csv")
+        every = ("k", "k_p", "c", "c_p", "c + c_p")
+        rest = 1.0, 0.9, 1.1, 1.0, "determined", 0.9, 1.1
+        seeds = [(name, q, seed, *rest) for seed in range(2) for q in every]
+        INTERVALS.write(batches[-1], seeds)
+    rows = coverage(study, of_targets, batches, files).rows
+    for name, file, of_target in zip(study.cases, files, of_targets, strict=True):
+        (shown,) = (row for row in rows if (row["case"], row["quantity"]) == (name, "c + c_p"))
+        alone = {
+            q.label: bound for q, bound in bounds_at_truth(study.cases[name], of_target, [file])
+        }
+        assert shown["bound_percent"] == pytest.approx(100 * alone["c + c_p"])
+    ends = [row["bound_percent"] for row in rows if row["quantity"] == "c + c_p"]
+    assert ends[1] > 10 * ends[0]

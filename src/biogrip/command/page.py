@@ -135,7 +135,8 @@ def draw_every_trace(outcome: Outcome, columns: Mapping[str, str]) -> tuple[Figu
     said += f"Large marks: means of each {unit}." if unit else "Cells are taken for independent."
     # A panel each side by side, as many as a screen has room for.
     width_in = max(style.PAGE_IN, ONE_COLUMN_IN / 2 * min(len(columns), _MOST_PANELS))
-    return draw_cells(cells, compared, {name: units[name] for name in columns}, width_in), said
+    units = {name: units[name] for name in columns}
+    return draw_cells(cells, compared, units, width_in, unit), said
 
 
 def _told_by(data: Mapping[str, Any], copied: Mapping[str, str]) -> Told:

@@ -135,6 +135,8 @@ class SampleCase:
             uncertainty=uncertainty.by_part if uncertainty else {},
             fit_start=measurement.fit_start,
             record=self.record,
+            tip_power=measurement.tip_power,
+            fit_contact=measurement.fit_contact,
             undeclared=frozenset(
                 name for name in measurement.along if getattr(measurement, name) is None
             ),
@@ -156,11 +158,12 @@ class SampleCase:
             return judged
         measured, models = self.block.measurement, self.common.model_selection.models
         # A recorded load that is there in its first row came before that.
-        known = measured.fit_start or (self.record is not None and not self.record[0, 1])
+        first = None if self.record is None else self.record[0, 1]
+        known = measured.fit_start or first == 0 or (measured.tip_power and (first or 0.0) < 0)
         usual = read_configs([trace_defaults()])["model_selection"]["models"]
         return replace(
             judged,
-            start_given=known or measured.start_s is not None,
+            start_given=bool(known) or measured.start_s is not None,
             models=models,
             usual_models=[*models] == usual,
         )

@@ -18,6 +18,7 @@ from biogrip.digits import counted
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.problem import ReportProgress, silent
 from biogrip.fit.trace_fit import TraceFit
+from biogrip.identify.contact import notes_on_contact
 from biogrip.identify.other_fits import (
     Trace,
     fits_of,
@@ -30,6 +31,7 @@ from biogrip.identify.other_fits import (
 from biogrip.identify.prepare import prepare
 from biogrip.judging.diagnosis import Diagnosis, diagnose_all, with_times
 from biogrip.judging.doubts import DOUBT, HARMLESS, ROUNDED, Note, find_slow_misfit, name_suspects
+from biogrip.judging.linearity import notes_on_gains
 from biogrip.judging.onset import notes_on_start, profile_over_onset
 from biogrip.traces.reader import Recording
 
@@ -120,7 +122,9 @@ def _notes_on_trace(
     yield from on_fit
     if experiment.instrument.sweeps:
         return
-    start = notes_on_start(experiment, recording.time_s, recording.readings, judged)
+    yield from notes_on_gains(judged.likelihood, judged.notes)
+    start = [*notes_on_contact(replace(judged, recording=recording, experiment=experiment))]
+    start = start or notes_on_start(experiment, recording.time_s, recording.readings, judged)
     yield from start
     rounded = any(note.about == ROUNDED and note.weight == DOUBT for note in judged.notes)
     # Beside another start, or errors of rounding, an offset and a drift mean nothing.

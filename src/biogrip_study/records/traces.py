@@ -30,6 +30,8 @@ class Measurements:
     """Noisy trace of each seed, (n_samples,) each."""
     sd: Array | None = None
     """Standard deviations of the readings, (n_samples,), where they are known."""
+    correlation: Array | None = None
+    """Correlation of the noise of both moduli of a sweep, (n_frequencies,)."""
     sd_known: bool = True
     """False if only their ratios are, see `Recording.sd_known`."""
     onset_s: float | None = None
@@ -47,6 +49,7 @@ class Measurements:
             readings,
             index,
             sd=self.sd,
+            correlation=self.correlation,
             sd_known=self.sd_known,
             onset_s=self.onset_s,
             remarks_before=self.remarks,
@@ -101,6 +104,7 @@ def write_measurements(path: Path, measurements: Measurements) -> None:
         "time_s": measurements.time_s,
         "target": measurements.target,
         "sd": measurements.sd,
+        "correlation": measurements.correlation,
         "sd_known": None if measurements.sd_known else False,
         "seeds": list(measurements.readings),
         "traces": list(measurements.readings.values()),
@@ -123,6 +127,7 @@ def read_measurements(path: Path, seeds: list[int] | None = None) -> Measurement
         arrays.get("target"),
         chosen,
         sd=arrays.get("sd"),
+        correlation=arrays.get("correlation"),
         sd_known="sd_known" not in arrays,
         onset_s=None if onset_s is None else float(onset_s),
         remarks=tuple(map(str, arrays.get("remarks", ()))),

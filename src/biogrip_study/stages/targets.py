@@ -117,6 +117,6 @@ def record(case: Case, recorded: Path, measurements: Path) -> None:
     remarks = tuple(trace.remarks())
     for remark in remarks:
         warn(f"{place(recorded)}: {remark}")
-    known = trace.sd, trace.sd_known, trace.onset_s, remarks
+    known = trace.sd, trace.correlation, trace.sd_known, trace.onset_s, remarks
     measured_trace = Measurements(trace.time_s, None, {0: trace.readings}, *known)
     write_measurements(measurements, measured_trace)
