@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array, IntArray
-from biogrip.fit.least_squares import FAIR, FINE
+from biogrip.fit.least_squares import FINE
 from biogrip.fit.levenberg_marquardt import Normal
 from biogrip.fit.trace_fit import TraceFit
 from biogrip.judging import profiles
@@ -31,7 +31,6 @@ from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.protocol import hold
 from biogrip.physics.sample_model import with_fixed
 from biogrip_study.stages.judgement import judge_quantities
-from tests.helpers.default import seen
 from tests.helpers.identified import told
 from tests.helpers.problems import (
     GRIPPER,
@@ -358,28 +357,6 @@ def test_a_fit_is_news_if_it_is_lower_by_a_thousandth() -> None:
         increases, x = np.array([3.0, 10.0]), np.zeros((2, 1))
         news = keep_lower(increases, x, np.array([1]), np.array([lower]), np.ones((1, 1)))
         assert (news.tolist(), increases[1], x[1, 0]) == ([False, expected], lower, 1.0)
-
-
-@pytest.mark.parametrize("shape", [(3, 1), (1, 3)])
-@pytest.mark.parametrize("first", [0, 2])
-def test_a_deeper_basin_is_followed_both_ways_along_a_map(
-    shape: tuple[int, int], first: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Of two basins, with chi^2 higher by 1 and by 5; from the optimum one end finds the deeper."""
-    values = np.array([1.0, 2.0, 3.0]).reshape(shape)
-
-    class TwoBasins:
-        def __init__(self, *_: object) -> None:
-            pass
-
-        def with_fixed(self, x: Array, _: object, tolerance: float) -> tuple[Array, Array]:
-            fitted, found_alone = x.copy(), x[:, 0] == np.log(values.ravel()[first])
-            fitted[found_alone & (tolerance == FAIR), 2] = 1.0
-            return np.where(fitted[:, 2] == 1.0, 1.0, 5.0), fitted
-
-    monkeypatch.setattr(profiles, "ConstrainedFits", TwoBasins)
-    increases, _ = profiles._increases(seen(best=np.zeros(3)), [0, 1], values, values)
-    assert increases.tolist() == np.ones(shape).tolist()
 
 
 def test_a_value_is_tried_where_excesses_vanish_or_halfway() -> None:

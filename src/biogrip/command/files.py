@@ -272,11 +272,11 @@ def identify_batch(
             write_result(outputs[index], data, made_from[index])
         if drawn:
             # Imported here: loading Matplotlib takes long.
-            from biogrip.command.page import draw
+            from biogrip.command.page import trace_pictures
 
             # What is found counts without a picture, too.
             with _caught(own, {}):
-                outcome.pictures[own.name] = draw(diagnosis, data)
+                outcome.pictures[own.name] = trace_pictures(diagnosis, data)
     outcome.refused.update((own.name, refused[own.name]) for own in asked if own.name in refused)
     return outcome
 

@@ -14,7 +14,6 @@ comes below the optimum, all is done again from there. Then notes are taken, in 
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import Any
 
 import numpy as np
 
@@ -38,11 +37,10 @@ from biogrip.judging.doubts import (
     compute_status,
     examine_residuals,
 )
-from biogrip.judging.hidden import Hidden, find_hidden
 from biogrip.judging.likelihood import Likelihood, check_rows, make_likelihood
-from biogrip.judging.profiles import compute_valley
 from biogrip.judging.quantities import characteristic_times, parameters_and_sum
 from biogrip.judging.verdicts import DETERMINED, Finding, Trade, compute_findings, find_trade_offs
+from biogrip.judging.what_moves import Move, find_moves
 from biogrip.judging.without_model import KINDS, WithoutModel, tell_without_model, times_told
 from biogrip.physics.sample_model import C_P
 from biogrip.physics.simulation import Grip
@@ -62,10 +60,8 @@ class Diagnosis:
     """A verdict on every parameter and on the sum of the exchangeable ones."""
     trades: list[Trade] = field(default_factory=list)
     """Parameters of which only a combination is determined."""
-    valley: dict[str, Any] | None = None
-    """Map of chi^2 over two exchangeable parameters, see `compute_valley`, if it is asked for."""
     lowest: Array | None = None
-    """Log-parameters at which profiles or valley come below the best fit."""
+    """Log-parameters at which profiles come below the best fit."""
     converged: bool = True
     """False if the best fit has not converged."""
     grip: Grip | None = None
@@ -114,10 +110,12 @@ class Diagnosis:
         return replace(told, told=[]) if hopeless else told
 
     @cached_property
-    def hidden(self) -> list[Hidden]:
-        """Errors that the trace could hide, none of a rejected fit, see `find_hidden`."""
-        none = self.status == REJECTED or self.likelihood.problem.residuals.course.sweeps
-        return [] if none else find_hidden(self.likelihood, self.findings)
+    def moves(self) -> list[Move]:
+        """What errors of the instrument do to determined quantities, none of a rejected fit."""
+        of = [each.quantity for each in self.findings if each.verdict == DETERMINED]
+        if self.status == REJECTED or not of:
+            return []
+        return find_moves(self.likelihood, of, start_fitted=self.onset_limits_s is not None)
 
     def __repr__(self) -> str:
         """Return status and verdicts, a line each."""
@@ -125,11 +123,9 @@ class Diagnosis:
         return "\n".join([f"fit {self.status}", *lines])
 
 
-def diagnose(
-    problem: TraceProblem, fit: Fit, *, confidence: float, valley: bool = False
-) -> Diagnosis:
+def diagnose(problem: TraceProblem, fit: Fit, *, confidence: float) -> Diagnosis:
     """Judge the identification of one trace by profile likelihoods, as `diagnose_all` does."""
-    return diagnose_all([problem], [fit], confidence=confidence, valley=valley)[0]
+    return diagnose_all([problem], [fit], confidence=confidence)[0]
 
 
 def diagnose_all(
@@ -137,21 +133,19 @@ def diagnose_all(
     fits: Sequence[Fit],
     *,
     confidence: float,
-    valley: bool = False,
 ) -> list[Diagnosis]:
     """Judge the identification of each of several traces, by one model, by profile likelihoods.
 
     No diagnosis depends on the other traces. Fits are their global optima, as far as is known. The
     noise of a trace, if its standard deviation is not known, is that of the residual. Limits have a
-    confidence, e.g. 0.95. If `valley` is true, chi^2 is mapped over exchangeable parameters, too.
+    confidence, e.g. 0.95.
     """
 
     def profile(likelihoods: Sequence[Likelihood]) -> list[Diagnosis]:
         model = problems[0].residuals.model
         every = compute_findings(likelihoods, parameters_and_sum(model))
         trades = map(find_trade_offs, likelihoods, every)
-        fits = list(map(profiled, likelihoods, every, trades))
-        return [_with_valley(diagnosis) for diagnosis in fits] if valley else fits
+        return list(map(profiled, likelihoods, every, trades))
 
     judged = settled(problems, fits, profile, confidence=confidence)
     return [_with_notes(diagnosis, find_notes()) for diagnosis, find_notes in judged]
@@ -211,12 +205,6 @@ def profiled(likelihood: Likelihood, findings: list[Finding], trades: list[Trade
     lowest = min((finding.profile for finding in every), key=lambda p: float(p.increases.min()))
     missed = lowest.lowest if lowest.increases.min() < -levels.MISSED else None
     return Diagnosis(likelihood, findings, trades, lowest=missed)
-
-
-def _with_valley(judged: Diagnosis) -> Diagnosis:
-    """Return a diagnosis with its valley, whose lowest point counts if no profile is lower."""
-    valley, missed = compute_valley(judged.likelihood)
-    return replace(judged, valley=valley, lowest=missed if judged.lowest is None else judged.lowest)
 
 
 def with_times(diagnoses: Sequence[Diagnosis]) -> list[Diagnosis]:

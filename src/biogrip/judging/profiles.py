@@ -1,7 +1,5 @@
 """Profile likelihood: minimum of chi^2 over all parameters against one quantity [1]_, [2]_.
 
-`compute_valley` maps chi^2 over two exchangeable parameters: the valley in which they trade off.
-
 All quantities of many traces are profiled at once, over their whole search ranges. All points are
 fitted from the optimum, then from the fits of both neighbours, again and again where these have
 improved: a basin found anywhere in a profile is followed both ways. Where a profile exceeds the
@@ -18,16 +16,14 @@ References
 .. [3] M. Dowell and P. Jarratt, BIT 11 (1971), 168-174.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
 import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray, IntArray
-from biogrip.digits import round_increase, rounded
 from biogrip.fit.least_squares import FAIR, FINE, alike
 from biogrip.judging.constrained_fits import CLOSE, ConstrainedFits
 from biogrip.judging.likelihood import Likelihood
@@ -387,77 +383,3 @@ def find_gaps(
             first, last = (np.interp(np.sqrt(threshold), roots[of], log_values[of]) for of in sides)
             gaps.append((float(first), float(last)))
     return tuple(gaps)
-
-
-# Shares of the first damper in the sum, dense where either is small, and sums relative to the best
-# one, dense in the valley.
-_VALLEY_SHARES = 1 / (1 + np.exp(-np.linspace(-8.0, 8.0, 31)))
-_BESIDE_VALLEY = np.array([0.005, 0.01, 0.015, 0.02, 0.03, 0.05, 0.08, 0.12, 0.2, 0.3])
-_VALLEY_SUMS = np.concatenate((1 - _BESIDE_VALLEY[::-1], [1.0], 1 + _BESIDE_VALLEY))
-# Second arm of the valley: if the branch is too weak to show, the second damper alone is the sum.
-_ARM_FIRSTS = np.concatenate((np.arange(0.002, 0.1, 0.005), np.linspace(0.11, 1.2, 12)))
-_ARM_SECONDS = np.concatenate((np.arange(0.9, 1.06, 0.005), [1.08, 1.12, 1.2]))
-
-
-def compute_valley(likelihood: Likelihood) -> tuple[dict[str, Any] | None, Array | None]:
-    """Compute the increase of chi^2 over two exchangeable parameters, with the others fitted.
-
-    The first returned has ``x`` and ``y``, names and units; ``best``; and ``grids``, along the
-    valley of constant sum and its arm of constant second parameter: ``x_values``, ``y_values`` and
-    ``increases``. It is None unless just two, among others, were searched. The second is a missed
-    optimum, or None.
-    """
-    model = likelihood.problem.residuals.model
-    pair = [index for index, p in enumerate(model.parameters) if p.name in model.exchangeable]
-    if len(pair) != 2 or len(model.parameters) == 2:
-        return None, None
-    best = np.exp(likelihood.best[pair])
-    sums = best.sum() * _VALLEY_SUMS[:, None]
-    arm = np.meshgrid(best.sum() * _ARM_FIRSTS, best.sum() * _ARM_SECONDS)
-    grids, missed = [], None
-    for x_values, y_values in ((sums * _VALLEY_SHARES, sums * (1 - _VALLEY_SHARES)), arm):
-        increases, lower = _increases(likelihood, pair, x_values, y_values)
-        grid = {
-            "x_values": _rows_of(x_values, rounded),
-            "y_values": _rows_of(y_values, rounded),
-        }
-        grids.append({**grid, "increases": _rows_of(increases, round_increase)})
-        missed = missed if lower is None else lower
-    both = [model.parameters[index] for index in pair]
-    x, y = ({"name": p.name, "symbol": p.symbol, "unit": p.unit} for p in both)
-    at_best = [rounded(float(value)) for value in best]
-    return {"x": x, "y": y, "grids": grids, "best": at_best}, missed
-
-
-def _rows_of(values: Array, rounding: Callable[[float], float | None]) -> list[list[float | None]]:
-    return [[rounding(float(value)) for value in row] for row in values]
-
-
-def _increases(
-    likelihood: Likelihood, pair: list[int], x_values: Array, y_values: Array
-) -> tuple[Array, Array | None]:
-    """Compute the increase of chi^2 at every point of a grid, and find a missed optimum."""
-    fits = ConstrainedFits([likelihood], [])
-    rows, columns = x_values.shape
-    x = np.tile(likelihood.best, (rows * columns, 1))
-    x[:, pair[0]], x[:, pair[1]] = np.log(x_values.ravel()), np.log(y_values.ravel())
-    fixed = np.isin(np.arange(x.shape[1]), pair)
-    increases = np.full(len(x), np.inf)
-    points, start = np.arange(len(x)), x.copy()
-    # A point, and its neighbours on the grid.
-    beside = np.pad(points.reshape(rows, columns), 1, constant_values=-1)
-    shifts = ((0, 1), (2, 1), (1, 0), (1, 2))
-    neighbours = np.stack([beside[i : i + rows, j : j + columns].ravel() for i, j in shifts])
-    tolerance = FAIR
-    while len(points):
-        lower = fits.with_fixed(start, fixed, tolerance)
-        news = keep_lower(increases, x, points, *lower)
-        origin = np.repeat(np.flatnonzero(news), 4)
-        points = neighbours[:, news].T.ravel()
-        origin, points = origin[points >= 0], points[points >= 0]
-        start = x[origin].copy()
-        start[:, pair] = x[points][:, pair]
-        tolerance = CLOSE
-    lowest = int(np.argmin(increases))
-    missed = x[lowest] if increases[lowest] < -levels.MISSED else None
-    return increases.reshape(rows, columns), missed

@@ -26,7 +26,7 @@ References
 
 import math
 from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from itertools import pairwise
 from typing import Any
@@ -39,8 +39,10 @@ from biogrip.arrays import Array, BoolArray
 from biogrip.digits import plain, with_limits
 from biogrip.fit.any_sample import AnySampleFit, Lags, count_lags, fit_any_sample
 from biogrip.judging.verdicts import verdict_of
+from biogrip.judging.what_moves import Move, as_moves, find_mistakes
 from biogrip.judging.whiteness import as_correlated, correlated
 from biogrip.physics.residuals import Residuals
+from biogrip.physics.units import inverse_of, per_second_of
 
 # First digits of the times at which quantities are told and, where these are too few, of more.
 _FIRST_DIGITS, _FEWEST_TIMES = ((1,), (1, 2, 5)), 2
@@ -55,13 +57,6 @@ _INNER = 2.0
 # Standard deviation of a quantity that counts as none, over the largest that a noise of one lag
 # makes; and a quantity that does, over its standard deviation.
 _LEAST_DEVIATION, _NO_VALUE = 1e-3, 1e-15
-
-# Of moduli, compliances, their slopes, and viscosities: N and m, or Pa.
-_UNITS_TOLD = {
-    "N/m": ("N/m", "m/N", "m/(N s)", "N s/m"),
-    "Pa": ("Pa", "1/Pa", "1/(Pa s)", "Pa s"),
-    "": ("", "", "1/s", "s"),
-}
 
 LEVEL, EXPONENT, LOSS, BEYOND, FLOW = "level", "exponent", "loss", "beyond", "flow"
 KINDS = (LEVEL, EXPONENT, LOSS, BEYOND, FLOW, "storage", "loss tangent", "increment", "slope")
@@ -133,6 +128,8 @@ class WithoutModel:
     """False if no linear sample gives this trace, for what the best leaves is no noise."""
     covered_s: tuple[float, float]
     """From when to when after a step there are readings, and so limits on either side."""
+    moves: list[Move] = field(default_factory=list)
+    """What errors of the instrument do to quantities that have a value."""
 
     def widened(self, others: Sequence["WithoutModel"]) -> "WithoutModel":
         """Return it with limits that hold those of others, too, as of other starts."""
@@ -164,6 +161,7 @@ class WithoutModel:
             "times_noise": self.times_noise,
             "misfit_rad": self.misfit,
             "covered_s": list(self.covered_s),
+            "moves": [asdict(move) for move in self.moves],
             "quantities": [
                 {**asdict(estimate), "verdict": estimate.verdict, "in_words": estimate.words()}
                 for estimate in self.told
@@ -203,11 +201,29 @@ def tell_without_model(
         sd = fit.sd * math.sqrt(free / independent)
     root = partial(_root, confidence, freedom, float(sd / residuals.noise_scale))
     times_s = at_s or times_told(*fit.lags.covered_s)
-    quantities = (
-        quantity for quantity in _quantities(residuals, fit.lags, times_s) if quantity.kind in kinds
-    )
-    told = [_find_limits(fit, quantity, root) for quantity in quantities]
-    return WithoutModel(told, fit.misfit, times, is_linear, fit.lags.covered_s)
+    chosen = [each for each in _quantities(residuals, fit.lags, times_s) if each.kind in kinds]
+    told = [_find_limits(fit, each, root) for each in chosen]
+    moves = _moves(fit, [own for own, it in zip(chosen, told, strict=True) if it.value])
+    return WithoutModel(told, fit.misfit, times, is_linear, fit.lags.covered_s, moves)
+
+
+def _moves(fit: AnySampleFit, quantities: Sequence["_Functional"]) -> list[Move]:
+    """Return what errors of the instrument do to quantities.
+
+    It is half the difference of fits with the error added to the readings and taken off.
+    """
+    residuals = fit.lags.residuals
+    trace, mistakes = residuals.trace, list(find_mistakes(residuals, fit.response))
+
+    def values(added: Array) -> Array:
+        changed = replace(trace, readings=trace.readings + added)
+        other = fit_any_sample(replace(residuals, trace=changed))
+        return np.array([quantity.of(other) for quantity in quantities])
+
+    given = np.array([quantity.of(fit) for quantity in quantities])
+    moved = (values(mistake.change) - values(-mistake.change) for mistake in mistakes)
+    changes = np.array([0.5 * each / given for each in moved]).T
+    return as_moves(mistakes, [quantity.name for quantity in quantities], changes)
 
 
 def _root(confidence: float, freedom: float, sd: float, more: int) -> float:
@@ -264,6 +280,12 @@ class _Functional:
         at_s, shown = self.at_s or 0.0, (lags.rates <= self.fastest) / lags.sizes
         below = self.below(at_s, lags.rates) if self.below else np.zeros_like(shown)
         return self.above(at_s, lags.rates) * shown, below * shown
+
+    def of(self, fit: AnySampleFit) -> float:
+        """Return what is told of a fit, NaN where it has none."""
+        above, below = (float(added @ fit.amplitudes) for added in self.added(fit.lags))
+        value = above / below if below else above if self.below is None else math.nan
+        return self.turned(value) if self.turned and value else value
 
 
 def _find_limits(
@@ -413,10 +435,10 @@ def _quantities(residuals: Residuals, lags: Lags, times: Sequence[float]) -> Ite
     inside = [time_s for time_s in times if first_s <= time_s <= last_s]
     # Slopes and moduli at an end of the trace are hardly known.
     inner = [time_s for time_s in inside if _INNER * first_s <= time_s <= last_s / _INNER]
-    stiffness = instrument.stiffness
-    letter, (unit, *of_creep) = "K" if stiffness == "N/m" else "G", _UNITS_TOLD[stiffness]
+    unit, viscosity = instrument.stiffness, per_second_of(instrument.stiffness)
+    letter = "K" if "/" in unit else "G"
     if not (deforms or jaws):
-        letter, unit = "J", of_creep[0]
+        letter, unit = "J", inverse_of(unit)
     # What falls is not smaller before the first reading, and not larger after the last one.
     falls, level = (1, _ADDED["left"]) if deforms else (-1, _ADDED["yielded"])
     for at_s in times:
@@ -434,7 +456,7 @@ def _quantities(residuals: Residuals, lags: Lags, times: Sequence[float]) -> Ite
         for before_s, at_s in pairwise(inside):
             name = f"J({before_s:g} to {at_s:g} s)"
             yield _Functional(name, "increment", at_s, unit, partial(_rise, before_s))
-        _, per_s, viscosity = of_creep
+        per_s = inverse_of(viscosity)
         yield _Functional("slope at the end", "slope", last_s, per_s, _ADDED["per second"])
         flow = _ADDED["flowing"]
         yield _Functional(

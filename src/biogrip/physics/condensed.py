@@ -28,11 +28,13 @@ from numpy.polynomial import chebyshev, legendre
 
 from biogrip.arrays import Array
 from biogrip.physics.modes import Modes, mode_responses, responses_in_turn, sum_of_modes
-from biogrip.physics.noise import Whitening, without
+from biogrip.physics.noise import PairWhitening, Whitening, without
 from biogrip.physics.protocol import Course
 from biogrip.physics.rate_tables import ModeRows, SpanningModes
 
 _NODES_A_PIECE = 20
+# Square of a norm that may be rounding.
+_ROUNDING_OF_NORM = 1e-9
 _DEGREE_OF_PIECE = _NODES_A_PIECE - 1
 _NODES_OF_PIECE = chebyshev.chebpts1(_NODES_A_PIECE)
 # From values at the nodes to coefficients of Legendre polynomials, which are nearly orthogonal
@@ -128,13 +130,22 @@ class Condensed:
     """Ascending sampling times, (n_samples,)."""
     functions: Array
     """Functions projected out, (n_functions, n_samples), but by whitening (`with_uncertain`)."""
-    whitening: Whitening | None = None
+    whitening: Whitening | PairWhitening | None = None
     """Transformation that whitens noise and projects nuisance out; None for white noise."""
 
     @property
     def nuisance(self) -> Array:
         """Functions that are projected out, (n_functions, n_samples)."""
         return self.functions if self.whitening is None else self.whitening.nuisance
+
+    @property
+    def taken(self) -> Array:
+        """Those of free amplitude, (n_taken, n_samples): what they reach is gone.
+
+        Others, of random amplitude, are shorter, and leave noise as large as elsewhere.
+        """
+        norms = np.sum(np.square(self.nuisance), axis=1)
+        return self.nuisance[norms > 1 - _ROUNDING_OF_NORM]
 
     def cleared(self, rows: Array) -> Array:
         """Project nuisance out of functions of time, (..., n_samples), and whiten noise."""

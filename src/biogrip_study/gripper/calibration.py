@@ -174,9 +174,9 @@ def calibrate(record: FreeMotion, step_Nm: float, impulse_Nms: float) -> Calibra
 def _first_guess(record: FreeMotion, step_Nm: float) -> Array:
     """Estimate stiffness from the step's end, frequency from the spectrum, damping from decay."""
     if len(record.time_s) < _FEWEST_SAMPLES_OF_RECORD:
-        found = f"found {counted(len(record.time_s), 'sample')}"
+        samples = f"found {counted(len(record.time_s), 'sample')}"
         raise BiogripError(
-            f"calibration: {found}, allowed are {_FEWEST_SAMPLES_OF_RECORD} or more."
+            f"calibration: {samples}, allowed are {_FEWEST_SAMPLES_OF_RECORD} or more."
         )
     tail = len(record.time_s) // 4
     stiffness = step_Nm / np.mean(record.step[-tail:])

@@ -82,9 +82,9 @@ class Correction:
         functions[:, time_s < edges_s[0]] = 0.0
         on_elements = enumerate(np.split(functions, cuts, axis=1))
         pieces = [
-            values[:, e] @ np.ascontiguousarray(of_element)
-            for e, of_element in on_elements
-            if of_element.size
+            values[:, e] @ np.ascontiguousarray(weights)
+            for e, weights in on_elements
+            if weights.size
         ]
         return np.concatenate(pieces, axis=1)
 
@@ -96,9 +96,9 @@ def nonlinear_rotation(
 
     A torque that closes the arms beyond what the model describes is a `BiogripError`.
     """
-    more = correction(gripper, network, torque).checked()
+    beyond_linear = correction(gripper, network, torque).checked()
     linear = step_response(gripper, network)
-    return superpose(linear, torque, time_s, arm) + more.at(time_s, arm)
+    return superpose(linear, torque, time_s, arm) + beyond_linear.at(time_s, arm)
 
 
 def correction(
@@ -122,7 +122,7 @@ def correction(
     tau = evaluate(torque, before_jumps).reshape(nodes.shape)
     times = np.ones(shape[0]) if factors is None else factors
     linear, linear_rate, tau = (
-        times[:, None, None, None] * course for course in (linear, linear_rate, tau)
+        times[:, None, None, None] * values for values in (linear, linear_rate, tau)
     )
     peak = np.abs(linear).max(axis=(1, 2, 3))
     extra, extra_rate, loads = np.zeros(shape), np.zeros(shape), np.zeros(shape)
@@ -135,9 +135,9 @@ def correction(
         loads[left] = load = b_0 * _load_of(gripper, arms, tau[left], u, u_rate)
         # That of both arms, and what that of the left one exceeds that of the right one by.
         load[:, 1:] = load[:, :1] - load[:, 1:]
-        ahead, extra_rate[left] = modes.respond(load, left)
-        change = np.abs(ahead - extra[left]).max(axis=(1, 2, 3))
-        extra[left] = ahead
+        new_extra, extra_rate[left] = modes.respond(load, left)
+        change = np.abs(new_extra - extra[left]).max(axis=(1, 2, 3))
+        extra[left] = new_extra
         converged[left] = change <= _LARGEST_CHANGE * peak[left]
         left = left[~converged[left] & np.isfinite(change)]
         if not len(left):

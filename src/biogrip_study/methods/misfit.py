@@ -73,9 +73,7 @@ def _series_of(every: Sequence[Residuals]) -> "SeriesMisfit | None":
         and residuals.model.network([residuals.model.example]).k.shape[1] == 1
     ):
         given = residuals.gripper, residuals.model, course, end_s / intervals
-        return SeriesMisfit(
-            *given, np.stack([residuals_of_one.trace.readings for residuals_of_one in every])
-        )
+        return SeriesMisfit(*given, np.stack([of_trace.trace.readings for of_trace in every]))
     return None
 
 
