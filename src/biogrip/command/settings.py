@@ -9,6 +9,7 @@ of the trace, from ``--hold``, or from a column of the file, ``--load``; where a
 modulus is read, a hold of 1 needs no option.
 """
 
+import os
 import re
 import sys
 from collections.abc import Mapping, Sequence
@@ -16,6 +17,7 @@ from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import numpy as np
 
@@ -56,6 +58,8 @@ LOAD = ("measurement", "load")
 """Key of the column of what was controlled."""
 
 _PROTOCOLS = (HOLD, LOAD, ("protocol",))
+# What stands in no name of a file everywhere, and what writes it.
+_UNSAFE = re.compile(r"[^\w .,=()+-]")
 _PRONY = re.compile(r"prony_?([1-8])")
 # What a sphere's force and indentation count as.
 _BY_SPHERE = {"force": "stress", "displacement": "strain"}
@@ -90,9 +94,10 @@ class Asked:
 
     @property
     def output(self) -> Path:
-        """The usual JSON file."""
-        part = re.sub(r"[^\w.-]+", "_", f".{self.part}").rstrip(".")
-        return self.trace.with_name(f"{self.trace.stem}{part}.identified.json")
+        """The usual JSON file: no two names of traces give one, but those with .csv and without."""
+        part = _UNSAFE.sub(lambda mark: quote(os.fsencode(mark[0]), safe=""), self.part)
+        name = ".".join(filter(None, (self.trace.name.removesuffix(".csv"), part)))
+        return self.trace.with_name(f"{name}.identified.json")
 
     @property
     def configs(self) -> list[Path]:
