@@ -274,7 +274,10 @@ def _measurement_of(
     """Return the block of the measurement, with its file and the usual names of columns."""
     axis = {"frequency": "omega_rad_per_s"} if instrument.sweeps else {"time": "time_s"}
     usual = {**axis, instrument.read.name: instrument.read.column}
-    file = ARRAYS if asked.arrays else str(asked.trace)
+    file = str(asked.trace)
+    # A block cannot have a name that is not valid text.
+    if asked.arrays or file.encode(errors="ignore").decode() != file:
+        file = ARRAYS
     measurement: dict[str, Any] = with_numbers(MeasurementBlock, {**usual, **given, "file": file})
     return measurement
 
