@@ -103,9 +103,8 @@ def hostile(count: int) -> Iterator[bytes]:
         size = int(10 ** rng.uniform(3, 6.5)) if seed >= 20 else tables._LARGEST_BYTES
         mark = rng.choice([",", ";", "\t", " ", '"', "\0", "#", "\n", "a", "é", "€", "😀", ", "])
         cell = rng.choice(["", "1", "12", "1.5e-7", "a", '"', "-", "1,5", "12:00:00", "'"])
-        line = ((cell + mark) * int(10 ** rng.uniform(0, 5))).encode()[
-            : int(10 ** rng.uniform(0, 6))
-        ]
+        cells, length = (10 ** rng.uniform(0, [5, 6])).astype(int).tolist()
+        line = ((cell + mark) * cells).encode()[:length]
         line += rng.choice([b"\n", b"\r\n", b"\r", b""])
         lines = (line or b"\n") * (size // max(len(line), 1) + 1)
         header = rng.choice([HEADER, "", "time_s rotation_rad\n", "# time_s,rotation_rad\n"])
