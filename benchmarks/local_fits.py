@@ -14,7 +14,7 @@ from benchmarks.report import Section, number, times_ours
 from benchmarks.timing import Timed, alternate
 from biogrip.arrays import Array
 from biogrip.fit.least_squares import FINISHED, best_of_starts, screened
-from biogrip.fit.problem import Row, TraceProblem, silent
+from biogrip.fit.problem import HistoryRow, TraceProblem, silent
 
 _ROUNDS, _FEW = 5, 3
 
@@ -32,7 +32,7 @@ class Started:
     problem: TraceProblem
     starts: Array
     """Log-parameters, (n_starts, n_parameters)."""
-    before: Row
+    before: HistoryRow
     """First row of the history, see `best_of_starts`."""
 
 
@@ -110,16 +110,15 @@ LOCAL_FITS = Section(
     f"""\
 Traces of Table 5's sample, each fitted from the same {_settings().starts} starting points, the best
 of random ones as in the study, to the best of the optima that they lead to. *biogrip* fits all
-starts at once, roughly, then the best {FINISHED} to the end, and settles the best of these to its
-last digit on all samples; *{BATCH} traces side by side*, as the study does, all starts of all
-traces. The others drive the same residuals and Jacobian, condensed to the same rows, one fit after
-the other and each to its own default tolerance (`benchmarks/fit_peers.py`): SciPy's trust region
-(trf), and lmfit's Levenberg-Marquardt (leastsq, bounds by its transformation, Dfun). *In two
-turns*, SciPy is spared what biogrip is spared: rough fits, and the best {FINISHED} to the end. What
-is done once for all traces, and the starting points, are not included. All but the batch are timed
-on its first {_FEW} traces, and times are those of one. The last column, over all {BATCH}:
-chi^2 = n (m/m_best)^2, n the samples and m_best the lowest misfit that any of them found, above its
-smallest value.""",
+starts at once, roughly, then the best {FINISHED} to the end; *{BATCH} traces side by side*, as the
+study does, all starts of all traces. The others drive the same residuals and Jacobian, condensed to
+the same rows, one fit after the other and each to its own default tolerance
+(`benchmarks/fit_peers.py`): SciPy's trust region (trf), and lmfit's Levenberg-Marquardt (leastsq,
+bounds by its transformation, Dfun). *In two turns*, SciPy is spared what biogrip is spared: rough
+fits, and the best {FINISHED} to the end. What is done once for all traces, and the starting points,
+are not included. All but the batch are timed on its first {_FEW} traces, and times are those of
+one. The last column, over all {BATCH}: chi^2 = n (m/m_best)^2, n the samples and m_best the lowest
+misfit that any of them found, above its smallest value.""",
     {
         "library": lambda row: row["library"],
         "time a trace (ms)": lambda row: number(row["time_ms"]),

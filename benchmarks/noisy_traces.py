@@ -15,7 +15,7 @@ from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.noise import add_noise, nuisance_basis, rms
 from biogrip.physics.protocol import Course, join_phases
-from biogrip.physics.residuals import Residuals, Trace
+from biogrip.physics.residuals import CondensedTrace, Residuals
 from biogrip.physics.response import step_response, superpose
 from biogrip.physics.sample_model import SampleModel
 from biogrip_study.config.study import Case, load_study
@@ -72,7 +72,7 @@ class NoisyTrace:
 
     def misfit(self) -> Misfit:
         """Return the study's misfit of a population against the trace."""
-        trace = Trace(self.trace_rad, _condensed())
+        trace = CondensedTrace(self.trace_rad, _condensed())
         residuals = Residuals(self.gripper, self.model, self.steps, trace, instrument=GRIPPER)
         return make_misfit(residuals)
 

@@ -23,14 +23,14 @@ import pandas as pd
 from benchmarks.one_thread import keep_to_one_thread
 from biogrip.arrays import Array
 from biogrip.files import write_text
-from biogrip.judging.without_model import Told, tell_without_model
+from biogrip.judging.without_model import Estimate, tell_without_model
 from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import NO_ARMS, Arm, Gripper
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.models import MODELS
 from biogrip.physics.noise import nuisance_basis
 from biogrip.physics.protocol import Phase, hold, join_phases, ramp
-from biogrip.physics.residuals import Residuals, Trace
+from biogrip.physics.residuals import CondensedTrace, Residuals
 from biogrip_study.records.identifications import share_in_words
 from tests.helpers.laplace import IMPEDANCES
 
@@ -151,7 +151,7 @@ class Truth:
         responses[elapsed > 0] = inverted(lambda s: self._response(s) / s**power, each)[which]
         return responses @ heights
 
-    def value(self, told: Told) -> float:
+    def value(self, told: Estimate) -> float:
         """Value of a quantity by its name."""
         name, at = told.quantity, told.at_s or 0.0
         if "rad/s" in name:
@@ -208,11 +208,11 @@ def residuals(name: str, readings: Array) -> Residuals:
     set_up, condensed = SET_UPS[name], _condensed(name)
     instrument = INSTRUMENTS[set_up.reads]
     gripper = _GRIPPER if instrument.has_jaws else NO_ARMS
-    trace = Trace(readings, condensed)
+    trace = CondensedTrace(readings, condensed)
     return Residuals(gripper, MODELS["maxwell"], condensed.course, trace, instrument=instrument)
 
 
-def first_order(truth: Truth, told: list[Told], noise_sd: float) -> list[float]:
+def first_order(truth: Truth, told: list[Estimate], noise_sd: float) -> list[float]:
     """Return widths of the right model's limits of quantities; inf where it tells nothing."""
     logs = np.log(truth.parameters)
 

@@ -290,7 +290,9 @@ def _quantities(*options: str) -> str:
 
 def folders() -> str:
     told = {
-        file.parent.relative_to(ROOT / "src"): ast.get_docstring(ast.parse(file.read_text("utf-8")))
+        file.parent.relative_to(ROOT / "src"): str(
+            ast.get_docstring(ast.parse(file.read_text("utf-8")))
+        )
         for file in sorted((ROOT / "src").glob("*/*/__init__.py"))
     }
     return _table({"folder of `src/`": str(name), "has": has} for name, has in told.items())

@@ -77,7 +77,7 @@ def test_progress_is_shown_and_that_of_a_command_is_no_output(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], alone: bool
 ) -> None:
     """A job's is: its log has what goes to standard error."""
-    monkeypatch.setattr(terminal, "_EVERY_S", 0.0)
+    monkeypatch.setattr(terminal, "_PROGRESS_INTERVAL_S", 0.0)
     with terminal.Progress(HOSTILE, 1, live=alone) as told:
         told.done()
     shown = capsys.readouterr()

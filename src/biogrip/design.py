@@ -130,13 +130,13 @@ def relative_bounds(slopes: Array, noise: float) -> Array:
     A parameter that is not told to a factor of e with all others known is taken as known for the
     others, as in `biogrip.judging.likelihood`, and has `NO_BOUND`.
     """
-    sizes, found = np.linalg.norm(slopes, axis=1) / noise, np.full(len(slopes), NO_BOUND)
+    sizes, bounds = np.linalg.norm(slopes, axis=1) / noise, np.full(len(slopes), NO_BOUND)
     informed = sizes >= 1
     rows = slopes[informed] / (noise * sizes[informed, None])
     # Parameters that stand for one another leave a matrix that can hardly be inverted.
     inverse = np.linalg.inv(rows @ rows.T + 1e-12 * np.eye(len(rows)))
-    found[informed] = np.sqrt(np.diag(inverse)) / sizes[informed]
-    return np.minimum(found, NO_BOUND)
+    bounds[informed] = np.sqrt(np.diag(inverse)) / sizes[informed]
+    return np.minimum(bounds, NO_BOUND)
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,7 +269,7 @@ def search(
     from scipy.optimize import differential_evolution
 
     unknowns, rng = 2 * limits.steps, np.random.default_rng(_SEED)
-    tried = [decode(each, limits) for each in rng.random((_TRIED, unknowns))]
+    tried = [decode(point, limits) for point in rng.random((_TRIED, unknowns))]
     reached = [
         np.any([one.told(train)[0] < NO_BOUND for train in tried], axis=0) & one.required
         for one in specimens
@@ -278,15 +278,15 @@ def search(
         text = "no protocol determines a parameter asked for; allowed are less noise, a higher "
         raise BiogripError(f"design: {text}`largest`, a longer duration_s or a higher rate_Hz.")
 
-    def score(each: Array) -> float:
-        bounds, least = zip(*(one.told(decode(each, limits)) for one in specimens), strict=True)
+    def score(point: Array) -> float:
+        bounds, least = zip(*(one.told(decode(point, limits)) for one in specimens), strict=True)
         if min(least) < _KEPT:
             return _PULLS - min(least)
         logs = np.log(np.concatenate(bounds)[np.concatenate(reached)])
         # The mean decides among equals, and last bits do not.
         return float(np.float32(logs.max() + 0.01 * logs.mean()))
 
-    found = differential_evolution(
+    result = differential_evolution(
         score,
         [(0.0, 1.0)] * unknowns,
         popsize=_POPSIZE,
@@ -295,7 +295,7 @@ def search(
         rng=rng,
         polish=False,
     )
-    return decode(found.x, limits), reached
+    return decode(result.x, limits), reached
 
 
 def decode(unknowns: Array, limits: Limits) -> Train:
@@ -344,17 +344,17 @@ def as_config(
     rate_Hz: float,
 ) -> str:
     """Return a config, as YAML, with an experiment as that of its cases."""
-    found = deepcopy(given)
-    cases = found.setdefault("cases", {})
+    config = deepcopy(given)
+    cases = config.setdefault("cases", {})
     for one, experiment in zip(specimens, after, strict=True):
         column = one.case.instrument.controlled.column
         phases = [
             {"duration_s": phase.duration_s, column: phase.level} for phase in experiment.phases
         ]
         measured = {"noise": {"level_rad": one.noise}, "rate_Hz": rate_Hz}
-        own = {"protocol": {"phases": phases}, "measurement": measured}
-        cases[one.case.name] = overlaid(cases.get(one.case.name) or {}, own)
-    text = yaml.safe_dump(found, sort_keys=False, default_flow_style=None, width=100)
+        designed = {"protocol": {"phases": phases}, "measurement": measured}
+        cases[one.case.name] = overlaid(cases.get(one.case.name) or {}, designed)
+    text = yaml.safe_dump(config, sort_keys=False, default_flow_style=None, width=100)
     return f"# {WRITTEN_BY} {__version__}: a protocol by `biogrip design`.\n{text}"
 
 
@@ -371,22 +371,22 @@ def _said(
         name, instrument = one.case.name, one.case.instrument
         controlled, read = instrument.controlled, instrument.read
         for index, parameter in enumerate(one.case.experiment.searched.names):
-            bounds = (each.bounds[index] for each in both)
-            percents = (f"{100 * it:.3g}" if it < NO_BOUND else "none" for it in bounds)
+            bounds = (rating.bounds[index] for rating in both)
+            percents = (f"{100 * bound:.3g}" if bound < NO_BOUND else "none" for bound in bounds)
             rows.append((name, f"{parameter}: bound (%)", *percents))
             if one.required[index] and not within[index]:
                 notes.append(f"No protocol that was tried determines {parameter} of {name}.")
         values = {
             with_unit(f"noise of the {read.name}", read.unit): [one.noise, one.noise],
             with_unit(f"largest {controlled.name}", controlled.unit): [
-                largest_load(each.phases) for each in both
+                largest_load(rating.phases) for rating in both
             ],
-            "highest rate (Hz)": [1 / np.diff(each.times_s).min() for each in both],
-            "readings": [len(each.times_s) for each in both],
+            "highest rate (Hz)": [1 / np.diff(rating.times_s).min() for rating in both],
+            "readings": [len(rating.times_s) for rating in both],
         }
         if instrument.has_jaws:
-            values["least force of the jaws (N)"] = [each.force_N for each in both]
-        rows += [(name, what, *(f"{it:.4g}" for it in pair)) for what, pair in values.items()]
+            values["least force of the jaws (N)"] = [rating.force_N for rating in both]
+        rows += [(name, what, *(f"{value:.4g}" for value in pair)) for what, pair in values.items()]
     yield aligned(rows, ("sample", "", "config's protocol", "designed"))
     yield from notes
     yield (

@@ -9,8 +9,8 @@ import numpy as np
 from biogrip.arrays import Array
 
 # More digits than data determine, and fewer than those in which processors differ.
-_DIGITS = 5
-_MOST_DIGITS = 9
+_ROUNDED_DIGITS = 5
+_MOST_ROUNDED_DIGITS = 9
 # Fits are converged to 0.001 in chi^2; smaller digits may differ between processors.
 _INCREASE_DECIMALS = 2
 
@@ -26,12 +26,12 @@ def rounded(value: float | None) -> float | None:
     """
     if value is None:
         return None
-    for digits in range(_DIGITS, _MOST_DIGITS):
+    for digits in range(_ROUNDED_DIGITS, _MOST_ROUNDED_DIGITS):
         found = float(f"{value:.{digits}g}")
-        fewer = range(2, _DIGITS)
+        fewer = range(2, _ROUNDED_DIGITS)
         if found == value or all(f"{found:.{few}g}" == f"{value:.{few}g}" for few in fewer):
             return found
-    return float(f"{value:.{_DIGITS}g}")
+    return float(f"{value:.{_ROUNDED_DIGITS}g}")
 
 
 def rounded_numbers(data: Any) -> Any:
@@ -45,7 +45,7 @@ def rounded_numbers(data: Any) -> Any:
 
 def round_increase(increase: float) -> float:
     """Round an increase of chi^2 to five digits, and to the tolerance of fits."""
-    return float(f"{round(increase, _INCREASE_DECIMALS):.{_DIGITS}g}") + 0.0
+    return float(f"{round(increase, _INCREASE_DECIMALS):.{_ROUNDED_DIGITS}g}") + 0.0
 
 
 def significant(values: Array, digits: int) -> Array:
@@ -63,7 +63,7 @@ def significant(values: Array, digits: int) -> Array:
 # Ends of the numbers that a person reads as plain decimals, and ratio of limits far apart.
 _SMALLEST_PLAIN, _LARGEST_PLAIN, _FAR_APART = 1e-4, 1e6, 10.0
 # Most digits of numbers with limits: those of a trace without noise coincide.
-_MOST_SHOWN = 7
+_MOST_DIGITS_WITH_LIMITS = 7
 
 
 def plain(value: float, digits: int = 3) -> str:
@@ -83,7 +83,7 @@ def within_limits(value: float, low: float, high: float, *others: float) -> list
     if not 0 < low <= high <= _FAR_APART * low:
         return [*(plain(each, 2) for each in numbers[:3]), *map(plain, others)]
     last = min(_power(high) - 2, _power((high - low) / 4) if high > low else -_LARGEST)
-    last = max(last, _power(high) + 1 - _MOST_SHOWN)
+    last = max(last, _power(high) + 1 - _MOST_DIGITS_WITH_LIMITS)
     if _SMALLEST_PLAIN <= value < _LARGEST_PLAIN:
         return [f"{round(each, -last):.{max(-last, 0)}f}" for each in numbers]
     return [f"{each:.{max(_power(each) - last, 0)}e}" for each in numbers]
@@ -98,7 +98,7 @@ def with_limits(value: float, low: float, high: float, unit: str = "") -> str:
 def instant(time_s: float, low_s: float, high_s: float) -> str:
     """Return a time of any clock and its limits, with two digits of how far the nearer one is."""
     sides = [side_s for side_s in (time_s - low_s, high_s - time_s) if side_s > 0]
-    decimals = max(1 - _power(2 * min(sides)), 0) if sides else _MOST_SHOWN
+    decimals = max(1 - _power(2 * min(sides)), 0) if sides else _MOST_DIGITS_WITH_LIMITS
     time, low, high = (f"{each:z.{decimals}f}" for each in (time_s, low_s, high_s))
     return f"{time} s ({low} to {high})"
 
@@ -118,7 +118,7 @@ def with_unit(name: str, unit: str) -> str:
 
 
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_POWER = re.compile(r"(\d[\d.]*)e([+-]\d+)\b")
+_E_NOTATION = re.compile(r"(\d[\d.]*)e([+-]\d+)\b")
 _MINUS = re.compile(r"(?<![\w.⁻-])-(?=\d)")
 _BEFORE_UNIT = re.compile(
     r"(?<=[\d⁰¹²³⁴⁵⁶⁷⁸⁹]) (?=%|[kmµn]?(?:N|m|s|rad|Pa|Hz|V)\b)|(?<=N|a) (?=[sm]\b)"
@@ -132,7 +132,7 @@ def legible(text: str) -> str:
         number, tens = plain(float(found[0]), 4), f"{int(found[2])}".translate(SUPERSCRIPTS)
         return f"{found[1]}·10{tens}" if "e" in number else number
 
-    return _BEFORE_UNIT.sub("\u00a0", _MINUS.sub("−", _POWER.sub(power, text)))
+    return _BEFORE_UNIT.sub("\u00a0", _MINUS.sub("−", _E_NOTATION.sub(power, text)))
 
 
 def p_value(chance: float) -> str:

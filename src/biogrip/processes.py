@@ -17,9 +17,9 @@ from types import FrameType
 
 from biogrip.terminal import CLEARED
 
-_SAID = {signal.SIGINT: "stopped", signal.SIGTERM: "ended by SIGTERM"}
+_ENDINGS = {signal.SIGINT: "stopped", signal.SIGTERM: "ended by SIGTERM"}
 
-_EVERY_S = 0.5
+_PARENT_CHECK_S = 0.5
 
 unfinished: set[str] = set()
 """Scratch files that are being written, to be removed if the command is stopped."""
@@ -27,12 +27,12 @@ unfinished: set[str] = set()
 
 def end_when_stopped() -> None:
     """Install handlers for stop signals, except those ignored, as with ``nohup``."""
-    for number in _SAID:
+    for number in _ENDINGS:
         if signal.getsignal(number) != signal.SIG_IGN:
-            signal.signal(number, _end)
+            signal.signal(number, _end_with_signal)
 
 
-def _end(number: int, _: FrameType | None) -> None:
+def _end_with_signal(number: int, _: FrameType | None) -> None:
     """Exit with a message after the command's name; the status is 128 plus the signal's number."""
     # Ignore further signals.
     for other in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
@@ -43,7 +43,7 @@ def _end(number: int, _: FrameType | None) -> None:
         sys.stdout.flush()
     with suppress(OSError):
         cleared = CLEARED if os.isatty(2) else ""
-        said = f"{_SAID[signal.Signals(number)]}; no file was left half-written."
+        said = f"{_ENDINGS[signal.Signals(number)]}; no file was left half-written."
         os.write(2, f"{cleared}biogrip: {said}\n".encode())
     os._exit(128 + number)
 
@@ -70,6 +70,6 @@ def end_with(parent: int) -> None:
 
 def _watch(parent: int) -> None:
     while os.getppid() == parent:
-        time.sleep(_EVERY_S)
+        time.sleep(_PARENT_CHECK_S)
     _remove_unfinished()
     os._exit(1)

@@ -10,20 +10,20 @@ from itertools import zip_longest
 CLEARED = "\r\x1b[K"
 """What clears a line of a terminal."""
 
-_EVERY_S = 5.0
+_PROGRESS_INTERVAL_S = 5.0
 # Control characters, marks that change the writing direction, line separators, and surrogates,
 # which stand for bytes in file names that are not valid text.
 _OBEYED = (
     *(range(0x20), range(0x7F, 0xA0), range(0x61C, 0x61D), range(0x200E, 0x2010)),
     *(range(0x2028, 0x202F), range(0x2066, 0x206A), range(0xD800, 0xE000)),
 )
-_SHOWN = {number: ascii(chr(number))[1:-1] for numbers in _OBEYED for number in numbers}
+_ESCAPED = {number: ascii(chr(number))[1:-1] for numbers in _OBEYED for number in numbers}
 _STREAMS = {"stdin": "r", "stdout": "w", "stderr": "w"}
 
 
 def visible(text: object) -> str:
     r"""Return text with control characters escaped, e.g. ``\x1b[31m`` of a change of colour."""
-    return str(text).translate(_SHOWN)
+    return str(text).translate(_ESCAPED)
 
 
 def visible_lines(text: object) -> str:
@@ -97,7 +97,7 @@ class Progress(AbstractContextManager["Progress"]):
         said = f"{self._what}: {self._done} of {self._total} done{self._phase}{more}"
         if self._live:
             print(f"{CLEARED}{said}", end="", file=sys.stderr, flush=True)
-        elif now - self._said >= _EVERY_S and not self._quiet:
+        elif now - self._said >= _PROGRESS_INTERVAL_S and not self._quiet:
             self._said = now
             # Of a job to standard output, so that it does not fill the log; there a command prints
             # its results.

@@ -1,5 +1,6 @@
 """All identifiers on the same problems; many fits at once, as if each were alone; descents."""
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -59,14 +60,8 @@ def test_an_answer_is_what_it_says(method: str) -> None:
 
 @pytest.mark.parametrize("method", METHODS)
 def test_evaluations_are_counted(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A derivative is a response; not counted is what settles an optimum, by the processor."""
+    """A derivative is a response."""
     posed, counted = problem("liquid_drop_2", 1), [0]
-
-    def settled_silently(*given: Any, **options: Any) -> Any:
-        before = counted[0]
-        found = refine(*given, **options)
-        counted[0] = before
-        return found
 
     def at_one(residuals: Residuals, x: Array) -> tuple[Array, Array]:
         counted[0] += 1
@@ -77,8 +72,6 @@ def test_evaluations_are_counted(method: str, monkeypatch: pytest.MonkeyPatch) -
         return of_many(residuals, x, slopes=slopes)
 
     of_one, of_many = Residuals.__call__, Residuals.condensed_responses
-    refine = least_squares.refine_optima
-    monkeypatch.setattr(least_squares, "refine_optima", settled_silently)
     monkeypatch.setattr(misfit, "_series_of", lambda residuals: None)
     monkeypatch.setattr(Residuals, "__call__", at_one)
     monkeypatch.setattr(Residuals, "condensed_responses", at_many)
@@ -179,28 +172,59 @@ def gradient(posed: TraceProblem, x: Array) -> Array:
 
 
 @pytest.mark.parametrize("model", MODELS_SETTLED)
-def test_curvatures_are_those_of_what_is_minimized(model: SampleModel) -> None:
-    """All second derivatives, against differences of gradients on all samples; away from optima."""
+def test_gradients_are_those_of_what_is_minimized(model: SampleModel) -> None:
+    """On condensed rows as on all samples; away from optima."""
     for posed, sample in noisy(model, 6):
         x = sample + 0.3
-        found = LocalFits([posed]).normal(x[None], np.zeros(1, dtype=np.int64), curved=True)
-        atol = 1e-8 * np.abs(found.gradient).max()
-        np.testing.assert_allclose(found.gradient[0], gradient(posed, x), rtol=1e-6, atol=atol)
-        units = 1e-4 * np.eye(len(x))
-        second = [(gradient(posed, x + u) - gradient(posed, x - u)) / 2e-4 for u in units]
-        # Of what the trace says nothing of, nearly all is rounding.
-        allowed = 1e-6 * np.abs(second).max() + 1e-8
-        np.testing.assert_allclose(found.information[0], second, rtol=0, atol=allowed)
+        normal = LocalFits([posed]).normal(x[None], np.zeros(1, dtype=np.int64))
+        atol = 1e-8 * np.abs(normal.gradient).max()
+        np.testing.assert_allclose(normal.gradient[0], gradient(posed, x), rtol=1e-6, atol=atol)
 
 
-def test_the_optimum_is_settled_to_the_last_digits() -> None:
-    """Where the gradient on all samples vanishes, from wherever one comes."""
-    experiment = problem("endothelial_cell", 3)
-    best = np.log(run("least_squares", experiment).parameters)
+def test_an_optimum_is_the_same_from_wherever_one_comes() -> None:
+    """In some thousandths of a standard deviation, on whose grid points lie."""
+    posed = problem("endothelial_cell", 3)
+    best = np.log(run("least_squares", posed).parameters)
     starts = best + 0.01 * np.random.default_rng(0).standard_normal((4, 4))
-    ends = [least_squares.fit_from([experiment], start).x[0] for start in starts]
-    assert np.max(np.ptp(ends, axis=0)) < 1e-9
-    assert np.max(np.abs(gradient(experiment, ends[0]))) < 1e-6
+    ends = np.array([least_squares.fit_from([posed], start).x[0] for start in starts])
+    information = LocalFits([posed]).normal(ends[:1], np.zeros(1, dtype=np.int64)).information[0]
+    apart = ends - ends.mean(axis=0)
+    assert np.all(np.einsum("ni,ij,nj->n", apart, information, apart) < 0.01**2)
+    uphill = gradient(posed, ends[0])
+    assert uphill @ np.linalg.solve(information, uphill) < 0.01**2
+
+
+def moved_last_bits(function: Any) -> Any:
+    """A function whose results differ by one in the last bit, up or down, as on a processor."""
+
+    def on_another(x: Any, **options: Any) -> Any:
+        exact = np.asarray(function(x, **options))
+        if exact.dtype != np.float64:
+            return exact
+        up = np.ascontiguousarray(exact).view(np.int64).reshape(exact.shape) % 3 - 1
+        return np.where(np.isfinite(exact), exact * (1 + up * 2.0**-52), exact)
+
+    return on_another
+
+
+@pytest.mark.parametrize("model", MODELS_SETTLED)
+def test_last_bits_of_a_processor_change_no_digit(
+    model: SampleModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of what a trace determines or not: nine digits of optima are the same."""
+    posed = [noisy_trace for noisy_trace, _ in noisy(model, 3)]
+    budget = least_squares.LeastSquaresSettings(100, 4)
+
+    def fitted() -> list[str]:
+        rngs = [np.random.default_rng(seed) for seed in range(3)]
+        fits = least_squares.identify_many(posed, budget, rngs)
+        return [f"{n:.8e}" for fit in fits for n in (*fit.parameters, fit.misfit)]
+
+    here = fitted()
+    for name in ("exp", "expm1", "log1p"):
+        monkeypatch.setattr(np, name, moved_last_bits(getattr(np, name)))
+    assert np.exp(np.arange(9.0)).tolist() != [math.exp(n) for n in range(9)]
+    assert fitted() == here
 
 
 def test_four_rough_fits_are_continued() -> None:
@@ -218,45 +242,6 @@ def test_four_rough_fits_are_continued() -> None:
     assert sorted(finished.x[:, 0]) == [0.0, 1.0, 2.0, 3.0]
     assert finished.misfit.min() == 1.0
     assert trace.tolist() == [0, 0, 0, 0]
-
-
-@pytest.mark.parametrize(("rise", "converged"), [(1e-4, True), (0.1, False)])
-def test_a_fit_that_stops_short_has_converged_if_no_data_tell(
-    rise: float, converged: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """After one step from where chi^2 is by so much higher; limits are where it is by 4."""
-    posed, one = problem("endothelial_cell", 0), np.zeros(1, dtype=np.int64)
-    best = least_squares.fit_from([posed], np.log([35.0, 12.3, 299.9, 1e-3])).x
-    fits = least_squares.LocalFits([posed])
-    curvature = fits.normal(best, one, curved=True).information[0, 0, 0]
-    start = best + np.sqrt(rise / curvature) * np.eye(4)[:1]
-    short = Minima(start, np.full(1, np.inf), one, np.ones(1, dtype=bool))
-    monkeypatch.setattr(least_squares, "minimize", lambda *_: short)
-    monkeypatch.setattr(least_squares, "_MOST_STEPS", 1)
-    assert least_squares.refine_optima(fits, short, one).converged == [converged]
-
-
-@pytest.mark.parametrize(
-    ("x", "gradient", "held"),
-    [(-1.0, 1.0, True), (-1.0, -1.0, False), (1.0, -1.0, True), (1.0, 1.0, False), (0, 1.0, False)],
-)
-def test_what_is_pushed_to_a_bound_has_no_curvature(x: float, gradient: float, held: bool) -> None:
-    """Bounds are -1 and 1; a gradient is uphill."""
-    whole, without = [[2.0, 1.0], [1.0, 2.0]], [[1.0, 0.0], [0.0, 2.0]]
-    normal = Normal(np.ones(1), np.array([[gradient, 0.5]]), np.array([whole]), np.ones(1))
-    bounds = {"low": np.full((1, 2), -1.0), "high": np.full((1, 2), 1.0)}
-    fits: Any = seen(normal=lambda x, trace, curved: normal, **bounds)
-    found = least_squares._convex(fits, np.array([[x, 0.0]]), np.zeros(1, dtype=np.int64))
-    assert found.information[0].tolist() == (without if held else whole)
-
-
-def test_long_steps_end_on_a_grid_or_at_a_bound() -> None:
-    nothing, ends = np.zeros((1, 2)), (np.array([[-0.7, -1.0]]), np.ones((1, 2)))
-    normal = Normal(np.ones(1), nothing, np.eye(2)[None], np.ones(1))
-    bound, free = least_squares._on_grid(ends[0] + [0, 0.3], nothing + 0.1, normal, *ends)[0]
-    assert bound == -0.7
-    assert free != -0.7
-    assert free == pytest.approx(-0.7, abs=2**-17)
 
 
 SLOPES = np.array([[3.0, 1.0], [1.0, 2.0], [0.0, 1.0]])

@@ -10,9 +10,9 @@ from biogrip.arrays import Array
 from biogrip.fit import trace_fit
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import identify_from
-from biogrip.fit.noise_model_fit import FAR
 from biogrip.fit.problem import Fit, TraceProblem
-from biogrip.fit.trace_fit import TraceFit, _alike, gripper_functions
+from biogrip.fit.trace_fit import TraceFit, _has_settled, gripper_functions
+from biogrip.levels import OUTLYING
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.noise import AR1, Drift, Noise, NoiseModel, Outliers, add_noise
 from biogrip.physics.simulation import simulated_response
@@ -54,9 +54,9 @@ def noisy(noise: Noise, seed: int = 0) -> Array:
 def test_noise_models_are_alike_if_shares_and_times_are() -> None:
     """Of a time, its logarithm counts, by its share."""
     one = NoiseModel(0.5, 20.0, 0.1)
-    assert _alike(one, replace(one, time_s=20.3, flicker=0.102))
-    assert not _alike(one, replace(one, time_s=20.5))
-    assert not _alike(one, replace(one, flicker=0.111))
+    assert _has_settled(one, replace(one, time_s=20.3, flicker=0.102))
+    assert not _has_settled(one, replace(one, time_s=20.5))
+    assert not _has_settled(one, replace(one, flicker=0.111))
 
 
 def test_white_noise_and_a_known_gripper_leave_the_fit_as_it_is() -> None:
@@ -104,7 +104,7 @@ def test_noise_is_found_and_said() -> None:
     assert fit.noise_model.ar1 + fit.noise_model.flicker == pytest.approx(0.5, abs=0.25)
     away = np.abs(noisy(noise) - noisy(replace(noise, outliers=None))) / (0.02 * CLEAN.max())
     # What is only just outside of the noise may be missed, or not.
-    assert set(np.flatnonzero(away > 2 * FAR)) <= set(np.flatnonzero(fit.outliers))
+    assert set(np.flatnonzero(away > 2 * OUTLYING)) <= set(np.flatnonzero(fit.outliers))
     assert np.count_nonzero(fit.outliers & (away == 0)) <= 1
     model, outliers = fit.notes()
     assert "correlated over some" in model

@@ -1,6 +1,7 @@
 """From a recording and an experiment to a diagnosis: the same by every way."""
 
 import json
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -19,6 +20,8 @@ from biogrip_study.stages.targets import record
 from tests.helpers.columns import columns_of
 from tests.helpers.default import study_of
 from tests.helpers.identified import identified, write_trace
+from tests.helpers.places import ROOT
+from tests.helpers.runs import ran
 
 TRUTH = {"k_s": 5e4, "k_v": 2e4, "c_v": 2e6, "tau_v": 100.0}
 SECONDS = np.arange(4.0, 600.0, 4.0)
@@ -93,6 +96,38 @@ def test_a_message_names_array_and_index() -> None:
         columns = columns_of("time_s", "strain", "strain", **own)
         with pytest.raises(BiogripError, match=said):
             identify(recording_of_arrays(columns, time_s, strain), creep)
+
+
+PLANNED = """
+only: [mine]
+cases: {mine: {sample: {model: damper, c_p: 80.0}}}
+measurement: {rate_Hz: 0.5}
+design: {steps: 1}
+"""
+TYPED = (
+    ("identify", "data/example_trace.csv", "--no-compare", "--report", "page.html"),
+    (
+        "identify",
+        "data/dishes/cells.tsv",
+        "--model",
+        "damper",
+        "--no-compare",
+        "--csv",
+        "found.csv",
+    ),
+    ("groups", "found.csv", "--by", "treatment", "--unit", "dish", "--plot", "cells.png"),
+    ("design", "mine.yaml"),
+)
+
+
+def test_the_method_needs_neither_the_study_nor_snakemake(tmp_path: Path) -> None:
+    """Of every command, in a process in which importing either is an error."""
+    shutil.copytree(ROOT / "data", tmp_path / "data")
+    (tmp_path / "mine.yaml").write_text(PLANNED)
+    without = "sys.modules |= {'biogrip_study.config.study': None, 'snakemake': None}"
+    code = f"import sys; {without}; from biogrip.cli import main; sys.exit(main(sys.argv[1:]))"
+    for command in TYPED:
+        ran(tmp_path, sys.executable, "-c", code, *command)
 
 
 def test_neither_study_nor_figures_are_loaded_for_a_trace() -> None:

@@ -11,8 +11,8 @@ from biogrip.arrays import Array
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import fit_from, identify_from
 from biogrip.judging.diagnosis import Diagnosis, diagnose
-from biogrip.judging.levels import FALSE_ALARM
 from biogrip.judging.whiteness import compare_halves, find_step, wandering
+from biogrip.levels import FALSE_ALARM
 from biogrip.library import Sample, set_up, simulate
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.protocol import hold

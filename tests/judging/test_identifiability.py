@@ -10,7 +10,13 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.judging.diagnosis import Diagnosis, _pulling, _ringing, _with_valley, diagnose
-from biogrip.judging.likelihood import Likelihood, bound, check_rows, covariance, make_likelihood
+from biogrip.judging.likelihood import (
+    Likelihood,
+    check_rows,
+    covariance,
+    least_sd,
+    make_likelihood,
+)
 from biogrip.judging.profiles import _increases, compute_valley
 from biogrip.judging.quantities import characteristic_times, find_combinations, parameters_and_sum
 from biogrip.judging.verdicts import BOUNDED_ABOVE, DETERMINED, NOT_DETERMINED
@@ -35,8 +41,8 @@ def test_a_parameter_without_information_is_taken_as_known() -> None:
     j = np.stack((t, 1e-9 * t**2))
     spring, damper = parameters_and_sum(MODELS["maxwell"])
     assert np.diag(covariance(j, 0.1)) == pytest.approx([0.01 / np.sum(t**2), np.inf])
-    assert math.isinf(bound(j, 0.1, np.zeros(2), damper))
-    assert math.isinf(bound(0 * j, 0.1, np.zeros(2), spring))
+    assert math.isinf(least_sd(j, 0.1, np.zeros(2), damper))
+    assert math.isinf(least_sd(0 * j, 0.1, np.zeros(2), spring))
 
 
 def test_covariances_of_few_readings() -> None:

@@ -18,7 +18,7 @@ from biogrip.judging.onset import _at, profile_over_onset
 from biogrip.judging.profiles import (
     Points,
     Profile,
-    _limits,
+    _find_crossings,
     compute_profiles,
     find_gaps,
     keep_lower,
@@ -217,7 +217,7 @@ def test_a_limit_is_in_the_deepest_basin_that_any_profile_knows() -> None:
     points = Points(TwoBasins(), [np.linspace(-5.0, 5.0, 11)] * 2)  # type: ignore[arg-type]
     points.from_optimum()
     points.from_neighbours(points.profile == 0)
-    assert _limits(points)[:, 0] == pytest.approx([np.nan, 3.0], abs=1e-6, nan_ok=True)
+    assert _find_crossings(points)[:, 0] == pytest.approx([np.nan, 3.0], abs=1e-6, nan_ok=True)
 
 
 def test_an_optimum_that_was_missed_is_judged_again() -> None:

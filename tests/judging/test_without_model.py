@@ -15,12 +15,12 @@ from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, N
 from biogrip.judging.without_model import (
     _ADDED,
     LEVEL,
-    Told,
+    Estimate,
     WithoutModel,
-    _Profile,
-    _Quantity,
-    decades,
+    _Excess,
+    _Functional,
     tell_without_model,
+    times_told,
 )
 from biogrip.library import Sample, set_up
 from biogrip.physics.gripper import Gripper
@@ -48,11 +48,11 @@ def tell(
     return tell_without_model(residuals, confidence=0.95, at_s=at_s)
 
 
-def by_name(found: WithoutModel) -> dict[str, Told]:
+def by_name(found: WithoutModel) -> dict[str, Estimate]:
     return {each.quantity: each for each in found.told}
 
 
-def between(told: Told) -> tuple[float, float]:
+def between(told: Estimate) -> tuple[float, float]:
     assert told.low is not None
     assert told.high is not None
     return told.low, told.high
@@ -233,7 +233,7 @@ def test_what_is_nothing_but_rounding_has_no_lower_limit() -> None:
     def slope(_: float, rates: Array) -> Array:
         return np.where(np.isin(rates, own), 1e-311, 1.0)
 
-    profile = _Profile(fit, _Quantity("slope", LEVEL, 10.0, "", slope), lambda more: 2.0)
+    profile = _Excess(fit, _Functional("slope", LEVEL, 10.0, "", slope), lambda more: 2.0)
     assert 0 < profile.best < 1e-305
     assert profile.limit(-1) is None
 
@@ -268,7 +268,10 @@ def test_what_lags_add_at_4_s() -> None:
 
 
 def test_other_starts_widen_limits_of_what_all_of_them_tell() -> None:
-    told, found = Told("G(1 s)", LEVEL, 1.0, "Pa", 15.0, 14.0, 16.0), tell(TIMES, zener(TIMES))
+    told, found = (
+        Estimate("G(1 s)", LEVEL, 1.0, "Pa", 15.0, 14.0, 16.0),
+        tell(TIMES, zener(TIMES)),
+    )
     own, other, none = (
         replace(found, told=each) for each in ([told], [replace(told, low=13.0, high=15.5)], [])
     )
@@ -277,14 +280,14 @@ def test_other_starts_widen_limits_of_what_all_of_them_tell() -> None:
 
 
 def test_times_at_which_it_is_told() -> None:
-    assert decades(0.3, 80.0) == [1.0, 10.0]
-    assert decades(3.0, 80.0) == [5.0, 10.0, 20.0, 50.0]
-    assert decades(12.0, 80.0) == [20.0, 50.0]
+    assert times_told(0.3, 80.0) == [1.0, 10.0]
+    assert times_told(3.0, 80.0) == [5.0, 10.0, 20.0, 50.0]
+    assert times_told(12.0, 80.0) == [20.0, 50.0]
 
 
 def test_words_are_those_of_a_verdict() -> None:
     ends = [(15.0, 14.0, 16.0), (None, 14.0, None), (None, None, 16.0), (None, None, None)]
-    told = [Told("G(1 s)", LEVEL, 1.0, "Pa", *each) for each in ends]
+    told = [Estimate("G(1 s)", LEVEL, 1.0, "Pa", *each) for each in ends]
     verdicts = [DETERMINED, BOUNDED_BELOW, BOUNDED_ABOVE, NOT_DETERMINED]
     assert [each.verdict for each in told] == verdicts
     words = ["15.0 Pa (14.0 to 16.0)", "at least 14 Pa", "at most 16 Pa", "not determined"]

@@ -13,7 +13,7 @@ from biogrip.physics.gripper import (
     CombDrive,
     Gripper,
     capacitance_slope,
-    contact,
+    find_contact,
     torque,
     voltage,
 )
@@ -26,7 +26,7 @@ from workflow.paper import mechanics
 @pytest.mark.parametrize("size_um", [30, 120])
 def test_the_tips_close_by_what_the_sample_leaves(either_gripper: Gripper, size_um: float) -> None:
     """Each goes half of the way; the stiffer arm asks for the torque."""
-    found = contact(either_gripper, 150e-6, TABLE_2, 1e-6 * size_um)
+    found = find_contact(either_gripper, 150e-6, TABLE_2, 1e-6 * size_um)
     before, after = (math.radians(a) for a in (75.0, found.reference_angle_deg))
     travel = 1.5e-3 * (math.cos(after) - math.cos(before))
     assert travel == pytest.approx(0.5e-6 * (150 - size_um), rel=1e-10)
@@ -44,7 +44,7 @@ def test_what_cannot_be_gripped_is_refused(gripper: Gripper) -> None:
         (30, 400, r"takes 7.\d+ degrees of each arm, allowed is the comb's stroke, 4.5 degrees"),
     ):
         with pytest.raises(BiogripError, match=message):
-            contact(gripper, 1e-6 * gap_um, TABLE_2, 1e-6 * size_um)
+            find_contact(gripper, 1e-6 * gap_um, TABLE_2, 1e-6 * size_um)
 
 
 def test_the_gripper_yields_as_two_springs_in_a_row(unequal_gripper: Gripper) -> None:

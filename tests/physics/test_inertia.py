@@ -11,13 +11,14 @@ from biogrip import library
 from biogrip.arrays import Array
 from biogrip.judging.diagnosis import diagnose
 from biogrip.judging.doubts import DOUBT, Note
+from biogrip.levels import VISIBLE
 from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.models import MODELS, generalized_maxwell
 from biogrip.physics.protocol import Course, hold, join_phases
 from biogrip.physics.response import LEFT, RIGHT, step_response, superpose
 from biogrip.physics.sample_model import Network
-from biogrip.physics.simulation import VISIBLE, elapsed_s, ring, ringing_s
+from biogrip.physics.simulation import elapsed_s, ring, ringing_s
 from tests.helpers.laplace import drawn, rotations, series
 from tests.helpers.problems import GRIPPER, MODEL, TORQUE
 from tests.physics.test_residuals import posed

@@ -14,9 +14,9 @@ from biogrip.physics.gripper import NO_ARMS, Gripper
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.modes import linear_responses
-from biogrip.physics.noise import nuisance_basis, with_uncertain, within, without
+from biogrip.physics.noise import nuisance_basis, within, without
 from biogrip.physics.protocol import Course, Phase, hold, join_phases, sample_times
-from biogrip.physics.residuals import Residuals, Trace
+from biogrip.physics.residuals import CondensedTrace, Residuals
 from biogrip.physics.response import step_response, superpose
 from biogrip.physics.sample_model import SampleModel, with_fixed
 from biogrip.physics.simulation import simulated_response
@@ -51,7 +51,7 @@ def assert_alike(residuals: Residuals, x: Array) -> int:
 
 
 def posed(gripper: Gripper, model: SampleModel, rows: Condensed, trace: Array) -> Residuals:
-    return Residuals(gripper, model, rows.course, Trace(trace, rows), instrument=GRIPPER)
+    return Residuals(gripper, model, rows.course, CondensedTrace(trace, rows), instrument=GRIPPER)
 
 
 def noise(count: int) -> Array:
@@ -206,20 +206,6 @@ def test_nuisance_takes_out_offset_and_drift_and_nothing_else(offset: bool, drif
 
 READ_S = np.arange(401.0)
 AT = np.log([2.0, 50.0])
-
-
-@pytest.mark.parametrize("count", [401, 4001, 60_001])
-def test_the_gradient_is_that_of_all_readings(gripper: Gripper, steps: Course, count: int) -> None:
-    """Whatever part of an amplitude is taken out, and of many readings through their nodes."""
-    times = np.linspace(0.0, 400.0, count)
-    offset = nuisance_basis(times, offset=True, drift=False)
-    basis = with_uncertain(offset, 0.1 * np.sin(times / 30)[None])
-    residuals = posed(gripper, MODELS["maxwell"], Condensed(steps, times, basis), noise(count))
-    residual, slopes = residuals(AT)
-    np.testing.assert_array_equal(residuals.left(AT), residual)
-    (gradient,), (misfit,) = residuals.gradients(AT[None], [residuals])
-    np.testing.assert_allclose(gradient, slopes @ residual, rtol=1e-11)
-    assert misfit == pytest.approx(np.sqrt(np.mean(residual**2)), rel=1e-12)
 
 
 def test_a_later_protocol_is_one_of_earlier_readings(gripper: Gripper, steps: Course) -> None:

@@ -60,7 +60,7 @@ def test_another_clone_is_not_run_with_the_code_and_config_of_this_one(
     (tmp_path / "linked").symlink_to("second")
     refused = snakemake(tmp_path, "-n", snakefile=snakefile, status=1)
     assert f"The rules are those of {tmp_path / 'second'}, but the code" in refused
-    assert f"{ROOT / 'src' / 'biogrip'}, from which biogrip is installed" in refused
+    assert f"{ROOT / 'src' / 'biogrip_study'}, from which biogrip is installed" in refused
     monkeypatch.setenv("PYTHONPATH", str(tmp_path / "linked" / "src"))
     planned = snakemake(tmp_path, "-n", snakefile=snakefile)
     assert {*re.findall(r"measurements/\w+/(\w+-\d+)", planned)} == {"seeds_0-6"}

@@ -37,8 +37,10 @@ def test_the_functions_that_a_rule_names_take_what_it_has() -> None:
     seen = set()
     for name, (_, body) in WRITTEN.items():
         has = {*re.findall(r"^ +(\w+)=", body, re.MULTILINE), *re.findall(r"{(\w+)}", body)}
-        for module, function in re.findall(r'"(\w+\.\w+)\.(\w+)"', body.partition("stages=")[2]):
-            stage = getattr(import_module(f"biogrip.{module}"), function)
+        for module, function in re.findall(
+            r'"(biogrip[\w.]+)\.(\w+)"', body.partition("stages=")[2]
+        ):
+            stage = getattr(import_module(module), function)
             assert {*signature(stage).parameters} <= has | {"case", "study", "seeds"}, name
             seen.add(name)
     assert {"target", "case_tables", "sweep", "convert_table", "page"} <= seen

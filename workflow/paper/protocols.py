@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 
 from biogrip.arrays import Array
 from biogrip.figures.style import BLACK, BLUE, ORANGE, PAGE_IN, SHADE, figure, panel, save, styled
-from biogrip.judging.levels import DETERMINED_PERCENT
 from biogrip.judging.likelihood import bounds_percent
+from biogrip.levels import DETERMINED_PERCENT
 from biogrip.physics.noise import standard_deviation
 from biogrip.physics.simulation import compute_grip, simulated_response
 from biogrip_study.config.study import Case, Study

@@ -21,7 +21,7 @@ from biogrip.physics.gripper import (
     Contact,
     Gripper,
     capacitance_slope,
-    contact,
+    find_contact,
 )
 from biogrip.physics.instruments import CONTROLLED, Instrument
 from biogrip.physics.models import ALIASES, MODELS, Sample
@@ -101,7 +101,7 @@ class GripperBlock(Gripper):
 
     def contact(self, comb: CombDrive, size_m: float) -> Contact:
         """Return the gripper's state when it is closed onto a sample."""
-        return contact(self.neutral, self.jaw_gap_m, comb, size_m)
+        return find_contact(self.neutral, self.jaw_gap_m, comb, size_m)
 
 
 @dataclass(frozen=True)

@@ -79,10 +79,10 @@ def read_config_of(kind: Any, files: Sequence[Path]) -> tuple[dict[str, Any], li
     These may be of a study; one that is nearly a key of the block is a `BiogripError`.
     """
     config, sources = read_configs(files), [*map(read_source, files)]
-    kinds: dict[KeyPath, Any] = {(): kind, ("identifiability",): IntervalBlock}
+    kinds: dict[tuple[str, ...], Any] = {(): kind, ("identifiability",): IntervalBlock}
     complaints, notes = list[Complaint](), list[str]()
     for above, block_kind in kinds.items():
-        block = config.get(above[0]) if above else config
+        block: Any = config.get(above[0]) if above else config
         known = [field.name for field in fields(block_kind)]
         for name in [*block] if isinstance(block, dict) else ():
             path = (*above, name)

@@ -169,7 +169,7 @@ def lay_out(drawn: Figure, dots_per_inch: float) -> None:
     drawn.set_layout_engine(None)
 
 
-_POWER = re.compile(r"\^\{(.*?)\}")
+_MATHTEXT_POWER = re.compile(r"\^\{(.*?)\}")
 
 
 class _Plain(LogFormatterSciNotation):
@@ -177,7 +177,7 @@ class _Plain(LogFormatterSciNotation):
 
     def __call__(self, x: float, pos: Any = None) -> str:
         text: str = super().__call__(x, pos)
-        plain = _POWER.sub(lambda power: power[1].translate(SUPERSCRIPTS), text)
+        plain = _MATHTEXT_POWER.sub(lambda power: power[1].translate(SUPERSCRIPTS), text)
         return re.sub(r"\$\\mathdefault\{(.*)\}\$", r"\1", plain).replace(r"\times", "×")
 
 

@@ -24,7 +24,7 @@ from biogrip.physics.noise import (
     with_uncertain,
 )
 from biogrip.physics.protocol import SWEEP, Course, Phase, follow_rows, join_phases
-from biogrip.physics.residuals import Residuals, Trace
+from biogrip.physics.residuals import CondensedTrace, Residuals
 from biogrip.physics.sample_model import SampleModel, with_fixed
 
 # Key of an arm that fits leave out, and its uncertainty with it.
@@ -190,7 +190,7 @@ class Experiment:
             # Only ratios count: deviations are as neighbours scatter in each half of the readings.
             neighbours = float(np.sqrt(np.mean(self.sd**2)))
             freedom = 0.5 * _OF_DIFFERENCES * len(readings)
-        trace = Trace(readings, rows, noise_sd or self.noise_sd, neighbours)
+        trace = CondensedTrace(readings, rows, noise_sd or self.noise_sd, neighbours)
         given = self.gripper, model or self.searched, self.torque, trace
         posed = Residuals(*given, instrument=self.instrument, freedom=freedom)
         return make_problem(posed, self.ranges)

@@ -29,12 +29,12 @@ import numpy as np
 
 from biogrip.arrays import Array, BoolArray, IntArray
 
-_LEAST_DAMPING = 1e-9
+_FIRST_DAMPING, _LEAST_DAMPING = 1e-2, 1e-9
 # In e-folds. Linearised responses are wrong for longer steps, which would waste starts.
 _LONGEST_STEP = 3.0
-_MOST_STEPS = 300
+_MOST_ITERATIONS = 1000
 _STANDSTILL = 1e-8
-_SMALLEST = 1e-300
+_LEAST_INFORMATION = 1e-300
 # Ratios of actual to predicted decrease are rounded to multiples of one over this.
 _RATIOS = 256
 # Grid spacing, in standard deviations of a parameter with all others known; and its maximum.
@@ -68,7 +68,7 @@ class Normal(Rows):
     gradient: Array
     """Half its gradient, (n, n_parameters)."""
     information: Array
-    """Half its Hessian, (n, n_parameters, n_parameters), by Gauss-Newton unless noted otherwise."""
+    """Half its Hessian, (n, n_parameters, n_parameters), by Gauss-Newton."""
     misfit: Array
     """RMS misfit to the trace, (n,)."""
 
@@ -125,8 +125,7 @@ def minimize(
     high: Array,
     tolerance: float,
     constraint: Constraint | None = None,
-    damping: float = 1e-2,
-    most_steps: int = _MOST_STEPS,
+    most_steps: int = _MOST_ITERATIONS,
     *,
     even: bool = False,
 ) -> Minima:
@@ -134,14 +133,14 @@ def minimize(
 
     Starts and bounds, (n, n_parameters), are logarithms; equal bounds fix a parameter. A problem
     has converged when the actual and the predicted relative decrease of its sum are below the
-    tolerance. The initial damping is relative to the diagonal of the information or, if it is
-    even, in units of the sum of squares.
+    tolerance. Damping is relative to the diagonal of the information or, if it is even, in units of
+    the sum of squares.
     """
     everyone, count = np.arange(len(starts)), len(starts)
     never = np.full(count, np.inf), np.ones(count, dtype=np.int64), np.zeros(count, dtype=bool)
     minima = Minima(starts.copy(), *never)
     normal, growth = objective(starts, everyone), np.full(count, 2.0)
-    state = _State(everyone, starts, low, high, normal, np.full(count, damping), growth)
+    state = _State(everyone, starts, low, high, normal, np.full(count, _FIRST_DAMPING), growth)
     for _ in range(most_steps):
         minima.evaluations[state.problem] += 1
         done = _advance(state, objective, constraint, tolerance, even=even)
@@ -173,7 +172,7 @@ def _advance(
     damping = state.damping[:, None]
     if even:
         damping = damping / _size(reduced.information)
-    step = bounded_step(reduced, damping, below, above)
+    step = _bounded_step(reduced, damping, below, above)
     # Valleys are straight in the logarithms or, where a sum is determined, in the parameters.
     straight = np.where(state.growth[:, None] > 2, np.log1p(np.maximum(step, -0.9)), step)
     tried, possible = _on_grid(x + straight, state), np.ones(len(x), dtype=bool)
@@ -209,15 +208,14 @@ def _on_grid(x: Array, state: _State) -> Array:
 def _size(information: Array) -> Array:
     """Return the diagonals of matrices, (n, n_parameters), never zero."""
     # A parameter without any effect must not divide by zero.
-    return np.abs(np.diagonal(information, axis1=1, axis2=2)) + _SMALLEST
+    return np.abs(np.diagonal(information, axis1=1, axis2=2)) + _LEAST_INFORMATION
 
 
-def bounded_step(normal: Normal, damping: Array, below: Array, above: Array) -> Array:
+def _bounded_step(normal: Normal, damping: Array, below: Array, above: Array) -> Array:
     """Compute damped Gauss-Newton steps within a box, (n, n_parameters).
 
-    The damping, (n, 1) or (n, n_parameters), is relative to the diagonal of the information, 0 for
-    plain Gauss-Newton. The box has the smallest and largest change of each parameter, (n,
-    n_parameters), with zero between them.
+    The damping, (n, 1) or (n, n_parameters), is relative to the diagonal of the information. The
+    box has the smallest and largest change of each parameter, (n, n_parameters), zero between them.
     """
     gradient, information = normal.gradient, normal.information
     fixed = ((below >= 0) & (gradient > 0)) | ((above <= 0) & (gradient < 0))

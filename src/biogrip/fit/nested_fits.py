@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray
 from biogrip.digits import plain
 from biogrip.fit.least_squares import LeastSquaresSettings, fit_from, identify_many
@@ -31,16 +32,16 @@ from biogrip.physics.sample_model import SampleModel
 
 # Factors by which an element that has vanished exceeds a usual one, or falls short of it, at a
 # start; and the usual relaxation time as a share of the length of the experiment.
-_AWAY, _SHARE = (3.0, 100.0), 0.1
+_AWAY_FROM_USUAL, _USUAL_SHARE = (3.0, 100.0), 0.1
 # Factors by which power laws have fewer points and fewer starts. Their responses take forty times
 # as long; of 150 fits to 75 traces none had a chi^2 higher by more than 5e-7 than with all.
-_FEWER = 10, 2
+_FEWER_FOR_POWER_LAWS = 10, 2
 # A decrease of chi^2 that is worth a fit, far below the 1 that a standard error changes it by.
-_NOTICEABLE = 0.01
+_WORTH_A_FIT = 0.01
 # Relaxation times that every branch of a single model tries.
-_TIMES = 6
+_TRIED_TIMES = 6
 # Models that are equivalent in other parameters may improve one another in turn.
-_MOST_ROUNDS = 3
+_MOST_REFITS = 3
 
 Fits = dict[str, dict[int, Fit]]
 """Fits by candidate and index of the trace."""
@@ -62,16 +63,16 @@ def deepen(problems: Sequence[TraceProblem], found: Sequence[Fit]) -> list[Fit]:
     if not pairs or model.power_law:
         return [*found]
     springs = [spring for spring, _ in pairs]
-    starts = np.repeat(np.log([fit.parameters for fit in found]), len(pairs) * _TIMES, axis=0)
-    every = starts.reshape(len(found), len(pairs), _TIMES, len(names))
+    starts = np.repeat(np.log([fit.parameters for fit in found]), len(pairs) * _TRIED_TIMES, axis=0)
+    every = starts.reshape(len(found), len(pairs), _TRIED_TIMES, len(names))
     for trace, problem in enumerate(problems):
         times = problem.residuals.trace.time_s
-        tried = np.log(np.geomspace(np.diff(times).min(), times[-1], _TIMES))
+        tried = np.log(np.geomspace(np.diff(times).min(), times[-1], _TRIED_TIMES))
         for place, (spring, damper) in enumerate(pairs):
             every[trace, place, :, spring] = np.mean(every[trace, place, 0, springs])
             every[trace, place, :, damper] = every[trace, place, 0, spring] + tried
         every[trace] = np.clip(every[trace], problem.low, problem.high)
-    which = np.repeat(np.arange(len(found)), len(pairs) * _TIMES)
+    which = np.repeat(np.arange(len(found)), len(pairs) * _TRIED_TIMES)
     ends = fit_from([problems[trace] for trace in which.tolist()], starts, roughly=True)
     best = [*found]
     for trace, problem in enumerate(problems):
@@ -108,14 +109,13 @@ def fit_models(
             points = [within_range(start, problem) for start in of_contained]
             points += [near[name][trace]] if near and name in near else []
             further.append(np.reshape(points, (-1, len(problem.low))))
-        own, (fewer, few) = settings, _FEWER
+        own, (fewer, few) = settings, _FEWER_FOR_POWER_LAWS
         if CANDIDATES[name].model.power_law:
             own = LeastSquaresSettings(-(-own.candidates // fewer), -(-own.starts // few))
         found[name] = {}
         if which:
             posed, random = [problems[name][it] for it in which], [rngs[name][it] for it in which]
-            given = posed, own, random, silent, further
-            fits = deepen(posed, identify_many(*given, to_last_digits=False))
+            fits = deepen(posed, identify_many(posed, own, random, silent, further))
             found[name] = dict(zip(which, fits, strict=True))
         done()
     _fit_again(problems, found)
@@ -135,7 +135,7 @@ def _of_contained(name: str, found: Fits, trace: int, longest_s: float) -> Itera
     for inner in different_in(name, [other for other in found if trace in found[other]]):
         parameters = as_richer(name, inner, found[inner][trace].parameters)
         gone = (kinds != "exponent") & ((parameters == 0) | ~np.isfinite(parameters))
-        for times in _AWAY if gone.any() else (1.0,):
+        for times in _AWAY_FROM_USUAL if gone.any() else (1.0,):
             start = parameters.copy()
             for index in np.flatnonzero(gone):
                 usual = _usual(kinds[index], kinds, parameters, ~gone, longest_s)
@@ -148,13 +148,13 @@ def _usual(kind: str, kinds: Array, values: Array, there: BoolArray, longest_s: 
     if np.any(own := there & (kinds == kind)):
         return float(np.exp(np.mean(np.log(values[own]))))
     others = values[there & (kinds != "exponent") & (values > 0)]
-    relaxation_s = _SHARE * longest_s if kind == "damping" else 1 / (_SHARE * longest_s)
+    relaxation_s = _USUAL_SHARE * longest_s if kind == "damping" else 1 / (_USUAL_SHARE * longest_s)
     return float(np.exp(np.mean(np.log(others)))) * relaxation_s
 
 
 def _fit_again(problems: Mapping[str, Sequence[TraceProblem]], found: Fits) -> None:
     """Fit again, in place, models that fit worse than a nested one within their range."""
-    for _ in range(_MOST_ROUNDS):
+    for _ in range(_MOST_REFITS):
         news = False
         for name, inner, trace in _worse(found):
             problem = problems[name][trace]
@@ -190,9 +190,9 @@ def _worse(found: Fits) -> Iterator[tuple[str, str, int]]:
 
 
 def _is_noticeably_lower(misfit: float, than: float, problem: TraceProblem) -> bool:
-    """Return True if a misfit is lower by what the data could tell: see `_NOTICEABLE`."""
+    """Return True if a misfit is lower by what the data could tell: see `_WORTH_A_FIT`."""
     gain = problem.residuals.samples * (than**2 - misfit**2)
-    return gain > _NOTICEABLE * misfit**2
+    return gain > _WORTH_A_FIT * misfit**2
 
 
 def _better_from(answer: Fit, problem: TraceProblem, start: Array) -> Fit:
@@ -217,10 +217,6 @@ def is_within(parameters: Array, problem: TraceProblem) -> bool:
     with np.errstate(divide="ignore"):
         x = np.log(parameters)
     return bool(np.all((x >= problem.low) & (x <= problem.high)))
-
-
-WORTH_A_MENTION, STRONG = 2.0, 6.0
-"""Differences of BIC from which on a simpler model is preferred, and any other."""
 
 
 @dataclass(frozen=True)
@@ -269,7 +265,8 @@ def _own_and_best(tried: Sequence[FittedModel], chosen: str) -> tuple[FittedMode
     own = next(each for each in tried if each.candidate == chosen)
     best = min(tried, key=lambda each: each.delta_bic)
     simpler = len(best.model.names) < len(own.model.names)
-    return own, best if own.delta_bic >= (WORTH_A_MENTION if simpler else STRONG) else own
+    needed = levels.WORTH_A_MENTION if simpler else levels.STRONG
+    return own, best if own.delta_bic >= needed else own
 
 
 def preferred(tried: Sequence[FittedModel], chosen: str) -> str | None:
@@ -284,7 +281,7 @@ def preferred_simpler(tried: Sequence[FittedModel], chosen: str) -> str | None:
     more = len(own.model.names) - len(best.model.names)
     # Difference of n ln(misfit^2), which leaves the number of parameters aside.
     worse = own.delta_aic - best.delta_aic - 2 * more
-    return best.candidate if more > 0 and worse <= WORTH_A_MENTION else None
+    return best.candidate if more > 0 and worse <= levels.WORTH_A_MENTION else None
 
 
 def fits_far_better(tried: Sequence[FittedModel], chosen: str) -> bool:

@@ -23,12 +23,10 @@ References
 
 import numpy as np
 
+import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray
 from biogrip.physics.noise import ROOT_12, NoiseModel, Whitening
 from biogrip.physics.residuals import Residuals
-
-FAR = 4.5
-"""Threshold in standard deviations of the noise, exceeded by one Gaussian reading in 150,000."""
 
 GAUSSIAN = 0.6744897501960817
 """Median absolute deviation of a normal distribution, in standard deviations."""
@@ -40,7 +38,7 @@ _AROUND = 11
 def outliers_of(residual: Array, rounding: float = 0.0) -> BoolArray:
     """Find outliers among residuals by a Hampel filter [5]_, (n_samples,).
 
-    They are further than `FAR` from the median of the eleven residuals around, in standard
+    They are further than `OUTLYING` from the median of the eleven residuals around, in standard
     deviations estimated from the median of all such distances. Where noise is not the same,
     residuals are over its standard deviation. A reading on the next step of rounding is no outlier.
     """
@@ -50,7 +48,7 @@ def outliers_of(residual: Array, rounding: float = 0.0) -> BoolArray:
     if not len(others):
         return np.zeros(len(residual), dtype=bool)
     scale = max(float(np.median(others)) / GAUSSIAN, rounding / ROOT_12)
-    return apart > FAR * scale
+    return apart > levels.OUTLYING * scale
 
 
 def measure_distances(residual: Array) -> Array:
@@ -60,8 +58,6 @@ def measure_distances(residual: Array) -> Array:
     return np.abs(residual - median_filter(residual, _AROUND, mode="mirror"))
 
 
-# Significance level: share of traces with the same noise everywhere in which it seems to grow.
-_FALSE_ALARM = 0.003
 # Degrees of freedom of Student's t; logarithms of least and largest odds of the growing part.
 _TAILS, _GROWTH_LEAST, _GROWTH_MOST = 4.0, -9.0, 20.0
 
@@ -76,7 +72,7 @@ def compute_growth(residual: Array, readings: Array, rounding: float = 0.0) -> A
     apart = np.maximum(measure_distances(residual), 1.5 * rounding)
     size = np.abs(readings)
     constant = np.ptp(apart) == 0 or np.ptp(size) == 0
-    if constant or significance_of_growth(apart, size) >= _FALSE_ALARM:
+    if constant or significance_of_growth(apart, size) >= levels.FALSE_ALARM:
         return np.ones(len(residual))
     from scipy.optimize import minimize_scalar
 

@@ -11,11 +11,11 @@ from biogrip.fit.search_range import GeneRange
 from biogrip.physics.residuals import Residuals
 from biogrip.physics.sample_model import SampleModel
 
-Progress = Callable[[int, float], None]
+ReportProgress = Callable[[int, float], None]
 """Callback that receives the number of simulated responses and the lowest misfit."""
 
 
-Row = tuple[Array, float, float, int]
+HistoryRow = tuple[Array, float, float, int]
 """Row of a history: best parameters so far, lowest and median misfit, evaluations so far."""
 
 
@@ -37,7 +37,7 @@ class History:
     """Responses simulated so far, (n_steps + 1,)."""
 
     @classmethod
-    def of(cls, rows: Sequence[Row]) -> "History":
+    def of(cls, rows: Sequence[HistoryRow]) -> "History":
         """Assemble a history from its rows."""
         parameters, best_misfit, median_misfit, counts = map(np.array, zip(*rows, strict=True))
         return cls(best_misfit, median_misfit, parameters, counts)
@@ -54,13 +54,13 @@ class Fit:
     generations: int
     """Number of steps: generations, or local fits."""
     evaluations: int
-    """Number of simulated responses, with derivatives or not, but for the last Newton steps."""
+    """Number of simulated responses, with derivatives or not."""
     stop_reason: str
     """Reason why the method stopped."""
     history: History = field(repr=False)
     """Course of the identification; that of what was fitted first, where more fits followed."""
     converged: bool = True
-    """False if the final Newton refinement of the optimum did not converge."""
+    """False if the last local fit did not converge."""
 
     def at(self, fit: Minima) -> "Fit":
         """Return a copy with the optimum of a local fit of this trace alone."""

@@ -11,13 +11,14 @@ from functools import partial
 
 import numpy as np
 
+import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray
 from biogrip.digits import counted, rounded
 from biogrip.fit.experiment import Experiment, pose
 from biogrip.fit.least_squares import fit_from, identify_many
 from biogrip.fit.nested_fits import deepen
 from biogrip.fit.noise_model_fit import NoiseModelLikelihood, growth_left, outliers_of
-from biogrip.fit.problem import Fit, Progress, TraceProblem, silent
+from biogrip.fit.problem import Fit, ReportProgress, TraceProblem, silent
 from biogrip.physics.noise import NoiseModel, drift_is_flow
 from biogrip.physics.simulation import simulated_response
 
@@ -67,12 +68,11 @@ def gripper_functions(experiment: Experiment, time_s: Array, parameters: Array) 
     return np.vstack((0.5 * (above - below), _SECOND_ORDER * second))
 
 
-_ROUNDS = 5
+_MOST_ROUNDS = 5
 # Changes of noise shares and times below this change no confidence limit in its third digit.
-_CONVERGED = 1e-2
+_NOISE_SETTLED = 1e-2
 # The same of a fit that moves by less, in standard deviations.
-_STAYED = 0.03
-_WORTH_SAYING = 0.005
+_FIT_SETTLED = 0.03
 
 Find = Callable[[Sequence[TraceProblem]], list[Fit]]
 """Function that finds the global optima of problems."""
@@ -119,7 +119,9 @@ class TraceFit:
             f"that grows with the {read}": noise_model.proportional,
         }
         parts = [f"{100 * noise_model.white:.0f} % white"]
-        parts += [f"{100 * n:.0f} % {what}" for what, n in others.items() if n >= _WORTH_SAYING]
+        parts += [
+            f"{100 * n:.0f} % {what}" for what, n in others.items() if n >= levels.WORTH_SAYING
+        ]
         said = [
             f"Noise model: of the variance {', '.join(parts)};{self.fitted_along} "
             "the intervals allow for all of it."
@@ -134,7 +136,7 @@ def fit_least_squares(
     experiments: Sequence[Experiment],
     traces: Sequence[tuple[Array, Array]],
     rngs: Sequence[np.random.Generator],
-    progress: Progress = silent,
+    progress: ReportProgress = silent,
 ) -> list[TraceFit]:
     """Fit each of several traces by least squares and, if wanted, estimate the model of its noise.
 
@@ -172,11 +174,11 @@ def _fit_in_noise(experiment: Experiment, time_s: Array, readings: Array, find: 
     (other,) = find([problem])
     if np.float32(other.misfit) < np.float32(found.misfit):
         found = other
-    along = _fitted_along(experiment, time_s)
+    along = _terms_fitted_along(experiment, time_s)
     return TraceFit(problem, found, noise_model, ~kept, errors, along)
 
 
-def _fitted_along(experiment: Experiment, time_s: Array) -> str:
+def _terms_fitted_along(experiment: Experiment, time_s: Array) -> str:
     terms = ["an offset"] * experiment.offset + ["a drift"] * experiment.drift
     if not terms:
         return ""
@@ -192,7 +194,7 @@ def _without_outliers(
 ) -> tuple[BoolArray, TraceProblem, Fit]:
     """Strike outliers, if the noise may have any, and fit again, until there are no more."""
     kept, plain = np.ones(len(time_s), dtype=bool), experiment.of(time_s, readings)
-    for _ in range(_ROUNDS):
+    for _ in range(_MOST_ROUNDS):
         (found,) = find([plain])
         if not experiment.coloured:
             break
@@ -217,7 +219,7 @@ def _in_turn(
     problem, noise_model = plain, None
     growth = growth_left(plain.residuals, np.log(found.parameters))
     grows = experiment.coloured and np.ptp(growth) > 0
-    for _ in range(_ROUNDS):
+    for _ in range(_MOST_ROUNDS):
         start = np.log(found.parameters)
         residual, sensitivity = plain.residuals(start)
         uncertain = gripper_functions(experiment, time_s, found.parameters)
@@ -235,7 +237,7 @@ def _in_turn(
         found = found.at(fit := fit_from([problem], start))
         slopes = problem.residuals.condensed_responses(fit.x)[0, 1:]
         moved = np.linalg.norm((fit.x[0] - start) @ slopes) / noise_sd
-        if moved < _STAYED and _alike(before, noise_model):
+        if moved < _FIT_SETTLED and _has_settled(before, noise_model):
             break
     errors = 0.0, 0.0
     if noise_model is not None:
@@ -245,10 +247,10 @@ def _in_turn(
     return problem, found, noise_model, errors
 
 
-def _alike(one: NoiseModel | None, other: NoiseModel | None) -> bool:
+def _has_settled(one: NoiseModel | None, other: NoiseModel | None) -> bool:
     if one is None or other is None:
         return one is other
     names = ("ar1", "flicker", "proportional", "walk")
     shares = sum(abs(getattr(one, name) - getattr(other, name)) for name in names)
     times = min(one.ar1, other.ar1) * abs(np.log(one.time_s / other.time_s))
-    return bool(shares + times < _CONVERGED)
+    return bool(shares + times < _NOISE_SETTLED)

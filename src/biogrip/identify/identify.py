@@ -16,7 +16,7 @@ import numpy as np
 
 from biogrip.digits import counted
 from biogrip.fit.experiment import Experiment
-from biogrip.fit.problem import Progress, silent
+from biogrip.fit.problem import ReportProgress, silent
 from biogrip.fit.trace_fit import TraceFit
 from biogrip.identify.other_fits import (
     Trace,
@@ -63,7 +63,7 @@ def budget(experiment: Experiment) -> Hashable:
 def identify_alike(
     traces: Sequence[Trace],
     *,
-    progress: Progress = silent,
+    progress: ReportProgress = silent,
     doing: Callable[[str], None] = lambda step: None,
     valley: bool = False,
 ) -> list[Diagnosis]:

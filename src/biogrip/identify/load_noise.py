@@ -24,10 +24,10 @@ from itertools import pairwise
 import numpy as np
 from scipy.special import chdtri
 
+import biogrip.levels as levels
 from biogrip.arrays import Array
 from biogrip.fit.any_sample import fit_responses, spread_lags
 from biogrip.fit.experiment import Experiment
-from biogrip.judging import levels
 from biogrip.physics.modes import lag_course
 from biogrip.physics.noise import without
 from biogrip.traces.reader import Recording
@@ -36,9 +36,8 @@ from biogrip.traces.reader import Recording
 _WEIGHTS = 10.0 ** np.arange(-2, 13)
 _FAR, _FEWEST = 8.0, 20
 _LAGS_A_DECADE = 2
-# Most readings that are compared, and by how much χ² has to fall: by less than a tenth it does
-# where nothing is smoothed out, and if it hardly falls, both courses will do.
-_MOST_READINGS, _BETTER = 5000, 1.0
+# Most readings that are compared.
+_MOST_READINGS = 5000
 
 
 def without_noise(experiment: Experiment, time_s: Array, readings: Array) -> tuple[Array, float]:
@@ -55,7 +54,7 @@ def without_noise(experiment: Experiment, time_s: Array, readings: Array) -> tup
     if not noise:
         return smooth, noise
     rest = _left(experiment, (experiment.record, smooth), time_s, readings)
-    better = rest[0] > rest[1] * np.exp(_BETTER / min(len(time_s), _MOST_READINGS))
+    better = rest[0] > rest[1] * np.exp(levels.SMOOTHED / min(len(time_s), _MOST_READINGS))
     return (smooth, noise) if better else (experiment.record, 0.0)
 
 

@@ -16,13 +16,13 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import chdtrc
 
+import biogrip.levels as levels
 from biogrip.arrays import Array
 from biogrip.digits import p_value, plain
 from biogrip.fit.any_sample import fit_any_sample
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import fit_from
 from biogrip.fit.nested_fits import (
-    WORTH_A_MENTION,
     Fits,
     FittedModels,
     Worth,
@@ -36,10 +36,9 @@ from biogrip.fit.nested_fits import (
     within_range,
 )
 from biogrip.fit.noise_model_fit import absorbed, compare_extremes, growth_left
-from biogrip.fit.problem import Fit, Progress, TraceProblem, silent
+from biogrip.fit.problem import Fit, ReportProgress, TraceProblem, silent
 from biogrip.fit.trace_fit import TraceFit, fit_least_squares
 from biogrip.identify.prepare import flow_of, for_trace
-from biogrip.judging import levels
 from biogrip.judging.diagnosis import Diagnosis, diagnose
 from biogrip.judging.doubts import (
     DOUBT,
@@ -72,7 +71,7 @@ Trace = tuple[Recording, Experiment]
 """A recording and the experiment that it is of, as `prepare` returns them."""
 
 
-def fits_of(traces: Sequence[Trace], progress: Progress) -> list[TraceFit]:
+def fits_of(traces: Sequence[Trace], progress: ReportProgress) -> list[TraceFit]:
     """Return the fits that judgements of traces with the same model and budget are based on."""
     experiments = [experiment for _, experiment in traces]
     rngs = [experiment.stream("identifiability") for experiment in experiments]
@@ -174,7 +173,7 @@ def _worth(own: Sequence[_Own], growths: Sequence[Array | None]) -> Worth:
             return True
         sizes = [len(CANDIDATES[each].model.names) for each in (name, *misfits)]
         bic = aic_and_bic([limit, *misfits.values()], fit.problem.residuals.samples, sizes)[1]
-        return bool(bic[0] < np.min(bic[1:]) - WORTH_A_MENTION)
+        return bool(bic[0] < np.min(bic[1:]) - levels.WORTH_A_MENTION)
 
     return worth
 

@@ -12,20 +12,18 @@ from operator import itemgetter
 import numpy as np
 from scipy.special import fdtri, ndtri
 
+import biogrip.levels as levels
 from biogrip.arrays import Array
 from biogrip.digits import plain
 from biogrip.errors import BiogripError
 from biogrip.fit.any_sample import fit_responses
 from biogrip.fit.experiment import Experiment
-from biogrip.judging import levels
 from biogrip.physics.modes import lag_course
 from biogrip.physics.noise import nuisance_basis, without
 from biogrip.physics.protocol import SWEEP, Course, largest_load
 from biogrip.traces.columns import TIME_UNITS, place
 from biogrip.traces.reader import Recording
 
-# Distance from the median, over that of all but a tenth, of what is no reading.
-_APART = 100.0
 # Relative tolerance, since times are written with few digits.
 _TIME_SLACK = 1e-5
 _LAG_SHARES = (1e-9, 0.03, 0.1, 0.3, 1.0, 10.0)
@@ -81,7 +79,7 @@ def check_recording(
     counts = len(responses), len(trace) - used
     if is_constant or np.ptp(trace) == 0 or not _responds(trace, nuisance, least, *counts):
         unit, off = f" {read.unit}".rstrip(), np.abs(trace - np.median(trace))
-        usual = _APART * np.quantile(off, 0.9)
+        usual = levels.NO_READING * np.quantile(off, 0.9)
         if 0 < usual < np.max(off):
             sample = int(np.argmax(off > usual))
             there = recording.place(sample, recording.read.reading_column)

@@ -16,6 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
+import biogrip.levels as levels
 from biogrip.arrays import Array
 from biogrip.digits import plain
 from biogrip.errors import BiogripError
@@ -24,7 +25,6 @@ from biogrip.fit.experiment import Experiment
 from biogrip.fit.search_range import GeneRange
 from biogrip.identify.load_noise import tare_of, without_noise
 from biogrip.identify.plausibility import check_moduli, check_recording
-from biogrip.judging import levels
 from biogrip.judging.onset import OnsetFits, estimate_onset
 from biogrip.physics.fractional import LONGEST_S, SHORTEST_S
 from biogrip.physics.noise import MOST_SAMPLES, drift_is_flow, estimate_noise, measure_rounding

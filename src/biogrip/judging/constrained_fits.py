@@ -22,10 +22,10 @@ from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.quantities import Quantity
 
 # E-folds from a bound at which a member counts as free, and by which rounding may exceed it.
-_FREE, _ROUNDING = 1e-9, 1e-7
+_FREE_OF_BOUND, _BEYOND_BOUND = 1e-9, 1e-7
 # Factor on the weight of members at a bound in the choice of the eliminated one.
 _UNWILLING = 1e-9
-_SMALLEST = 1e-200
+_LEAST_SLOPE = 1e-200
 
 
 class QuantityConstraint:
@@ -114,7 +114,7 @@ class QuantityConstraint:
             value = self._followed(x[left], fit[left], basic)
             inside = np.clip(value, self._low[fit[left]], self._high[fit[left]])
             x[left] = np.where(basic, inside, x[left])
-            reached = np.any(basic & (np.abs(value - inside) <= _ROUNDING), axis=1)
+            reached = np.any(basic & (np.abs(value - inside) <= _BEYOND_BOUND), axis=1)
             left = left[~reached]
             if not len(left):
                 return x
@@ -130,7 +130,7 @@ class QuantityConstraint:
     ) -> BoolArray:
         """Mark the member to eliminate, none if all have been tried."""
         weight = np.abs(slopes)
-        free = (x > self._low[fit] + _FREE) & (x < self._high[fit] - _FREE)
+        free = (x > self._low[fit] + _FREE_OF_BOUND) & (x < self._high[fit] - _FREE_OF_BOUND)
         weight = np.where(free, weight, _UNWILLING * weight)
         if tried is not None:
             weight = np.where(tried, 0.0, weight)
@@ -150,7 +150,7 @@ class QuantityConstraint:
         """Return the log-parameter derivatives of the quantities' logarithms on the constraint."""
         powers, sense = self._form(fit)
         shares = np.exp(np.minimum(sense * (x - self._targets[fit][:, None]), 0.0))
-        return np.where(sense == 0, powers, np.maximum(shares, _SMALLEST) * (powers != 0))
+        return np.where(sense == 0, powers, np.maximum(shares, _LEAST_SLOPE) * (powers != 0))
 
     def _followed(self, x: Array, fit: IntArray, basic: BoolArray) -> Array:
         """Solve the constraints for the marked members; infinite where there is no solution."""

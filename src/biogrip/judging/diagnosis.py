@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+import biogrip.levels as levels
 from biogrip.arrays import Array
 from biogrip.digits import plain
 from biogrip.fit.experiment import Experiment
@@ -25,7 +26,6 @@ from biogrip.fit.least_squares import fit_from
 from biogrip.fit.nested_fits import FittedModels
 from biogrip.fit.problem import Fit, TraceProblem
 from biogrip.fit.trace_fit import TraceFit
-from biogrip.judging import levels
 from biogrip.judging.doubts import (
     DOUBT,
     HARMLESS,
@@ -43,13 +43,13 @@ from biogrip.judging.likelihood import Likelihood, check_rows, make_likelihood
 from biogrip.judging.profiles import compute_valley
 from biogrip.judging.quantities import characteristic_times, parameters_and_sum
 from biogrip.judging.verdicts import DETERMINED, Finding, Trade, compute_findings, find_trade_offs
-from biogrip.judging.without_model import KINDS, WithoutModel, decades, tell_without_model
+from biogrip.judging.without_model import KINDS, WithoutModel, tell_without_model, times_told
 from biogrip.physics.sample_model import C_P
 from biogrip.physics.simulation import Grip
 from biogrip.traces.reader import Recording
 
 # Widening of a range, and the start beyond its end, in e-folds; and rounding.
-_WIDER, _BEYOND, _AT_END = np.log(1e3), 1.0, 1e-9
+_RANGE_WIDENING, _START_BEYOND, _AT_RANGE_END = np.log(1e3), 1.0, 1e-9
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Diagnosis:
     lowest: Array | None = None
     """Log-parameters at which profiles or valley come below the best fit."""
     converged: bool = True
-    """False if the best fit has not converged to its last digits."""
+    """False if the best fit has not converged."""
     grip: Grip | None = None
     """Force of the jaws on the sample of the best fit."""
     notes: list[Note] = field(default_factory=list)
@@ -106,7 +106,7 @@ class Diagnosis:
         tell = partial(tell_without_model, confidence=self.likelihood.confidence, kinds=kinds)
         found = tell(residuals, at_s=at_s)
         if self.onset_limits_s:
-            starts, times = map(residuals.later, self.onset_limits_s), decades(*found.covered_s)
+            starts, times = map(residuals.later, self.onset_limits_s), times_told(*found.covered_s)
             found = found.widened([tell(start, at_s=at_s or times) for start in starts])
         beyond_noise = found.misfit**2 - residuals.noise_scale**2
         far_off = beyond_noise > (levels.FAR_OFF * residuals.peak) ** 2
@@ -250,8 +250,8 @@ def _with_notes(judged: Diagnosis, of_rest: list[Note]) -> Diagnosis:
     notes += _pulling(grip, residuals.duration_s)
     if not judged.converged:
         text = (
-            "The fit has not converged to its last digits: further Newton steps increase "
-            "chi-squared. Rely on its verdicts, not on its digits."
+            "The fit has not converged: more steps would lower chi-squared a little. Rely on its "
+            "verdicts, not on its digits."
         )
         notes.append(Note(DOUBT, text))
     notes += _ringing(judged, rejected=compute_status(notes) == REJECTED)
@@ -276,11 +276,11 @@ def _range_ends(likelihood: Likelihood) -> Iterator[Note]:
         for end, outward, word in ((problem.low, -1.0, "lower"), (problem.high, 1.0, "upper")):
             # An exponent at its upper end is that of a damper: there is nothing beyond.
             bounded = outward > 0 and np.isfinite(parameter.below)
-            if bounded or abs(x[index] - end[index]) > _AT_END:
+            if bounded or abs(x[index] - end[index]) > _AT_RANGE_END:
                 continue
             start, low, high = x.copy(), problem.low.copy(), problem.high.copy()
-            start[index] += outward * _BEYOND
-            (low if outward < 0 else high)[index] += outward * _WIDER
+            start[index] += outward * _START_BEYOND
+            (low if outward < 0 else high)[index] += outward * _RANGE_WIDENING
             wider = fit_from([replace(problem, low=low, high=high)], start, roughly=True)
             if likelihood.increase(float(wider.misfit[0])) < -levels.BEYOND_THE_RANGE:
                 unit = f" {parameter.unit}" if parameter.unit else ""

@@ -20,6 +20,7 @@ from functools import cached_property, partial
 import numpy as np
 from scipy.special import chdtr, chdtrc
 
+import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray
 from biogrip.digits import counted, p_value, plain
 from biogrip.fit.any_sample import fit_any_sample
@@ -30,7 +31,7 @@ from biogrip.fit.noise_model_fit import (
     compute_growth,
     outliers_of,
 )
-from biogrip.judging import levels, whiteness
+from biogrip.judging import whiteness
 from biogrip.judging.likelihood import Likelihood
 from biogrip.physics.noise import MOST_SAMPLES, ROOT_12, NoiseModel, estimate_noise, without
 from biogrip.physics.residuals import Residuals
@@ -424,9 +425,8 @@ def _about_given(likelihood: Likelihood, residual: Array) -> Iterator[Note]:
         )
 
 
-# Of so many stretches of a trace with stationary noise, which is correlated for less than half a
-# stretch, none has so large a share of the sum of squares.
-_SLOW_STRETCHES, _IN_ONE = 20, 0.3
+# Stretches of `IN_ONE_STRETCH`.
+_SLOW_STRETCHES = 20
 # Of stretches with fewer readings the scatter is hardly known.
 _IN_A_STRETCH, _FEWEST_STRETCHES = 50, 3
 
@@ -473,7 +473,8 @@ def has_fast_noise(residuals: Residuals, residual: Array, slopes: Array) -> bool
     if residuals.coloured or len(time_s) > MOST_SAMPLES:
         return False
     stretches = np.array_split(np.square(residual), min(_SLOW_STRETCHES, len(residual)))
-    if max(float(np.sum(each)) for each in stretches) > _IN_ONE * float(residual @ residual):
+    largest = max(float(np.sum(stretch)) for stretch in stretches)
+    if largest > levels.IN_ONE_STRETCH * float(residual @ residual):
         return False
     noise_model = NoiseModelLikelihood(time_s, residual, slopes).best()
     fast = noise_model.time_s <= levels.SLOW * residuals.duration_s

@@ -14,10 +14,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtri
 
+import biogrip.levels as levels
 from biogrip.arrays import Array
 from biogrip.digits import plain
 from biogrip.fit.noise_model_fit import absorbed
-from biogrip.judging import levels
 from biogrip.judging.doubts import MANY, middle_of
 from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.verdicts import DETERMINED, Finding

@@ -23,16 +23,16 @@ from statistics import NormalDist
 
 import numpy as np
 
+import biogrip.levels as levels
 from biogrip.arrays import Array
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.problem import TraceProblem
-from biogrip.judging import levels
 from biogrip.judging.quantities import Quantity, parameters_and_sum
 from biogrip.physics.modes import linear_responses
 from biogrip.physics.noise import Noise, standard_deviation
 
 # Error of sums of squares, as a share of those of the largest reading or response.
-_ROUNDING = 1e-12
+_ERROR_OF_SUMS = 1e-12
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class Likelihood:
         """Return the first-order standard deviation of a quantity's logarithm.
 
         Every parameter has a prior of one e-fold, beyond which the linear approximation fails.
-        Unlike in a `bound`, no parameter is left out for want of information.
+        Unlike in a `least_sd`, no parameter is left out for want of information.
         """
         rows = self.problem.residuals.condensed_responses(self.best[None])[0]
         relative = rows[1:] / self.noise_sd
@@ -126,7 +126,7 @@ def check_rows(likelihood: Likelihood) -> None:
     # A spring beside an offset may be as stiff as its range allows.
     both = residuals.trace.readings, residuals.response(best)
     largest = max(float(np.max(np.abs(each))) for each in both)
-    rounding = _ROUNDING * residuals.samples * (largest / likelihood.noise_sd) ** 2
+    rounding = _ERROR_OF_SUMS * residuals.samples * (largest / likelihood.noise_sd) ** 2
     apart = likelihood.increase(of_rows) - likelihood.increase(of_readings)
     if abs(apart) > levels.MISSED + rounding:
         text = f"rows with a misfit of {of_rows:.6g} stand for readings with {of_readings:.6g}"
@@ -207,7 +207,9 @@ def covariance(
     return found
 
 
-def bound(sensitivity: Array, noise_sd: float | Array, log_parameters: Array, q: Quantity) -> float:
+def least_sd(
+    sensitivity: Array, noise_sd: float | Array, log_parameters: Array, q: Quantity
+) -> float:
     """Return the first-order standard deviation of a quantity's logarithm, by `covariance`."""
     gradient = q.gradient(log_parameters)
     return float(np.sqrt(covariance(sensitivity, noise_sd, gradient[None])[0, 0]))
@@ -232,7 +234,7 @@ def bounds_percent(
     sigma = standard_deviation(rotation, noise)
     with np.errstate(divide="ignore"):
         logarithms = np.log(values)
-    return [(q, 100 * bound(np.array(sensitivity), sigma, logarithms, q)) for q in quantities]
+    return [(q, 100 * least_sd(np.array(sensitivity), sigma, logarithms, q)) for q in quantities]
 
 
 def headlines(bounds: Sequence[tuple[str, float]]) -> list[str]:

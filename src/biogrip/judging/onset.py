@@ -22,6 +22,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.special import chdtri, stdtrit
 
+import biogrip.levels as levels
 from biogrip.arrays import Array, IntArray, parts
 from biogrip.digits import instant, plain
 from biogrip.fit.any_sample import fit_any_sample, fit_responses, spread_lags
@@ -29,7 +30,6 @@ from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import LeastSquaresSettings, fit_from, identify_many
 from biogrip.fit.noise_model_fit import absorbed
 from biogrip.fit.problem import TraceProblem, silent
-from biogrip.judging import levels
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.judging.doubts import DOUBT, HARMLESS, MANY, REJECTED, REJECTION, RING, Note
 from biogrip.judging.likelihood import Likelihood, compute_fall, make_likelihood
@@ -257,8 +257,6 @@ _EARLIER = 0.1
 # Newton steps that move a load along the clock, and by how many readings at most; share of squares
 # of what moves that is rounding.
 _STEPS_OF_CLOCK, _MOST_ROWS, _TOLD = 3, 3.0, 1e-6
-# Share of what a start has to gain that any sample has to where it was guessed.
-_MOSTLY = 0.5
 # Accuracy of an end of the onset's interval, as a share of its distance.
 _ACCURACY = 0.01
 
@@ -305,7 +303,8 @@ def _about_late_onset(fits: OnsetFits, diagnosis: Diagnosis, guess_s: float) -> 
     given, needed = fits.given(diagnosis.likelihood), chdtri(1, levels.SURELY)
     fall_to = partial(compute_fall, len(trace[0]), given.misfit, noise_sd=noise_sd)
     # Fitted along, a start cannot gain more than any sample, but for what moving it a little does.
-    if fall_to(fit_any_sample(fits.posed(guess_s).residuals).misfit) < _MOSTLY * needed:
+    of_any_sample = fit_any_sample(fits.posed(guess_s).residuals).misfit
+    if fall_to(of_any_sample) < levels.OF_WHAT_A_START_GAINS * needed:
         return
     found = fits.best(guess_s)
     fall = fall_to(found.misfit)

@@ -25,10 +25,10 @@ from typing import Any
 
 import numpy as np
 
+import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.digits import round_increase, rounded
 from biogrip.fit.least_squares import FAIR, FINE, alike
-from biogrip.judging import levels
 from biogrip.judging.constrained_fits import CLOSE, ConstrainedFits
 from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.quantities import Quantity
@@ -37,10 +37,10 @@ HIGHEST = 16.0
 """Increase of chi^2 up to which a profile has dense points, as figures show no more."""
 
 # Largest difference between neighbours of the square root of the increase, which is nearly linear.
-_STEP = 0.3
-_MOST_ROUNDS = 8
+_ROOT_STEP = 0.3
+_MOST_HALVINGS = 8
 # Improvement of a fit, relative to 1 + increase of chi^2, that has its neighbours fitted again.
-_NEWS = 1e-3
+_LEAST_IMPROVEMENT = 1e-3
 
 
 class Points:
@@ -101,15 +101,17 @@ class Points:
         new = self.values[left + 1] != values
         self._add(left[new], values[new])
         self._deepen(np.flatnonzero(np.isin(self.values, values[new])))
-        for _ in range(_MOST_ROUNDS):
+        for _ in range(_MOST_HALVINGS):
             roots = np.sqrt(np.clip(self.increases, 0.0, HIGHEST))
-            left = np.flatnonzero((np.abs(np.diff(roots)) > _STEP) & (np.diff(self.profile) == 0))
+            left = np.flatnonzero(
+                (np.abs(np.diff(roots)) > _ROOT_STEP) & (np.diff(self.profile) == 0)
+            )
             self._add(left, 0.5 * (self.values[left] + self.values[left + 1]))
 
     def _deepen(self, limits: IntArray) -> None:
         """Fit limits above the threshold from the ends of all profiles, and their neighbours."""
         profile = self.profile[limits]
-        missed = self.increases[limits] > _CLEARLY * self.fits.threshold[profile]
+        missed = self.increases[limits] > levels.GAP * self.fits.threshold[profile]
         limits, profile = limits[missed], profile[missed]
         if not len(limits):
             return
@@ -139,19 +141,17 @@ def keep_lower(
     for at, increase, parameters in zip(point.tolist(), found.tolist(), fitted, strict=True):
         before = increases[at]
         if increase < before:
-            news[at] |= increase < before - _NEWS * (1 + abs(increase))
+            news[at] |= increase < before - _LEAST_IMPROVEMENT * (1 + abs(increase))
             increases[at], x[at] = increase, parameters
     return news
 
 
 # Points near the best fit, in standard deviations, that every profile has.
-_NEAR = np.array([z for z in np.arange(-4.0, 4.1, 0.5) if z != 0])
-_POINTS = 35
+_NEAR_OPTIMUM = np.array([z for z in np.arange(-4.0, 4.1, 0.5) if z != 0])
+_EVENLY = 35
 # Points closer to the optimum than this are left out.
-_APART = 1e-9
-_ACCURACY = 1e-5
-# Factor by which a gap exceeds the threshold: fits give chi^2 with an error of about 0.01.
-_CLEARLY = 1.01
+_LEAST_GAP_OF_POINTS = 1e-9
+_ROOT_ERROR = 1e-5
 
 
 @dataclass(frozen=True)
@@ -195,11 +195,11 @@ def compute_profiles(
 
 
 def _profiles(fits: ConstrainedFits, *, smooth: bool) -> list[Profile]:
-    grids = [_grid(each, quantity) for each in fits.likelihoods for quantity in fits.quantities]
+    grids = [_grid_of(each, quantity) for each in fits.likelihoods for quantity in fits.quantities]
     points = Points(fits, grids)
     points.from_optimum()
     points.from_neighbours()
-    limits = _limits(points).T
+    limits = _find_crossings(points).T
     if smooth:
         points.smooth(limits)
     found = []
@@ -226,17 +226,17 @@ def _profiles(fits: ConstrainedFits, *, smooth: bool) -> list[Profile]:
     return found
 
 
-def _grid(likelihood: Likelihood, quantity: Quantity) -> Array:
+def _grid_of(likelihood: Likelihood, quantity: Quantity) -> Array:
     """Return ascending values over a quantity's whole range, denser near the optimum."""
     low, high = quantity.range(likelihood.problem.low, likelihood.problem.high)
     start = quantity.log(likelihood.best)
-    near = start + likelihood.deviation(quantity) * _NEAR
-    others = np.concatenate((near[(near > low) & (near < high)], np.linspace(low, high, _POINTS)))
+    near = start + likelihood.deviation(quantity) * _NEAR_OPTIMUM
+    others = np.concatenate((near[(near > low) & (near < high)], np.linspace(low, high, _EVENLY)))
     # Rounding must not make two points of an optimum that lies at an end.
-    return np.unique(np.append(others[np.abs(others - start) > _APART], start))
+    return np.unique(np.append(others[np.abs(others - start) > _LEAST_GAP_OF_POINTS], start))
 
 
-def _limits(points: Points) -> Array:
+def _find_crossings(points: Points) -> Array:
     """Find the limits, where profiles cross the threshold, (2, n_profiles); NaN without limit."""
     fits, ends = points.fits, points.ends()
     crossed = np.full(ends.shape, np.nan)
@@ -260,7 +260,7 @@ def _limits(points: Points) -> Array:
 
 
 # Most fits for a crossing, and the width of an interval in which a profile jumps.
-_MOST_FITS, _CLOSEST = 40, 1e-7
+_MOST_FITS_OF_CROSSING, _WIDTH_OF_JUMP = 40, 1e-7
 
 
 def crossings(
@@ -286,7 +286,7 @@ def crossings(
     moved = np.full(len(profile), -1)
     found = ends[1].copy()
     left = np.arange(len(profile))
-    for tries in range(_MOST_FITS):
+    for tries in range(_MOST_FITS_OF_CROSSING):
         if not len(left):
             break
         share = excess[0, left] / (excess[0, left] - excess[1, left])
@@ -301,7 +301,7 @@ def crossings(
         reached, fitted = fits.from_each(profile[left], tried, starts, FINE)
         over = np.sqrt(np.maximum(np.min(reached, axis=0), 0.0)) - root_threshold[left]
         # A basin deeper than that of the outer end may be deeper at the outer end, too.
-        missed = np.sqrt(np.maximum(reached[2], 0.0)) - root_threshold[left] > over + _ACCURACY
+        missed = np.sqrt(np.maximum(reached[2], 0.0)) - root_threshold[left] > over + _ROOT_ERROR
         if np.any(missed):
             outer = left[missed]
             beyond = fits.at(profile[outer], values[1, outer], fitted[missed], FINE)
@@ -315,8 +315,8 @@ def crossings(
         excess[1 - side[again], left[again]] *= 0.5
         moved[left] = side
         # Where a deeper basin begins, the increase may jump past the threshold.
-        apart = np.abs(ends[1, left] - ends[0, left]) > _CLOSEST
-        left = left[(np.abs(over) > _ACCURACY) & apart & ~void]
+        apart = np.abs(ends[1, left] - ends[0, left]) > _WIDTH_OF_JUMP
+        left = left[(np.abs(over) > _ROOT_ERROR) & apart & ~void]
     return found
 
 
@@ -327,7 +327,7 @@ def find_gaps(
     roots = np.sqrt(np.maximum(increases, 0.0))
     found = []
     for start, end in pairwise(np.flatnonzero(increases < threshold).tolist()):
-        if end > start + 1 and increases[start + 1 : end].max() > _CLEARLY * threshold:
+        if end > start + 1 and increases[start + 1 : end].max() > levels.GAP * threshold:
             # Places for `np.interp` ascend from inside to outside.
             sides = [start, start + 1], [end, end - 1]
             first, last = (np.interp(np.sqrt(threshold), roots[of], log_values[of]) for of in sides)
@@ -337,12 +337,12 @@ def find_gaps(
 
 # Shares of the first damper in the sum, dense where either is small, and sums relative to the best
 # one, dense in the valley.
-_SHARES = 1 / (1 + np.exp(-np.linspace(-8.0, 8.0, 31)))
-_BESIDE = np.array([0.005, 0.01, 0.015, 0.02, 0.03, 0.05, 0.08, 0.12, 0.2, 0.3])
-_SUMS = np.concatenate((1 - _BESIDE[::-1], [1.0], 1 + _BESIDE))
+_VALLEY_SHARES = 1 / (1 + np.exp(-np.linspace(-8.0, 8.0, 31)))
+_BESIDE_VALLEY = np.array([0.005, 0.01, 0.015, 0.02, 0.03, 0.05, 0.08, 0.12, 0.2, 0.3])
+_VALLEY_SUMS = np.concatenate((1 - _BESIDE_VALLEY[::-1], [1.0], 1 + _BESIDE_VALLEY))
 # Second arm of the valley: if the branch is too weak to show, the second damper alone is the sum.
-_FIRSTS = np.concatenate((np.arange(0.002, 0.1, 0.005), np.linspace(0.11, 1.2, 12)))
-_SECONDS = np.concatenate((np.arange(0.9, 1.06, 0.005), [1.08, 1.12, 1.2]))
+_ARM_FIRSTS = np.concatenate((np.arange(0.002, 0.1, 0.005), np.linspace(0.11, 1.2, 12)))
+_ARM_SECONDS = np.concatenate((np.arange(0.9, 1.06, 0.005), [1.08, 1.12, 1.2]))
 
 
 def compute_valley(likelihood: Likelihood) -> tuple[dict[str, Any] | None, Array | None]:
@@ -358,13 +358,16 @@ def compute_valley(likelihood: Likelihood) -> tuple[dict[str, Any] | None, Array
     if len(pair) != 2 or len(model.parameters) == 2:
         return None, None
     best = np.exp(likelihood.best[pair])
-    sums = best.sum() * _SUMS[:, None]
-    arm = np.meshgrid(best.sum() * _FIRSTS, best.sum() * _SECONDS)
+    sums = best.sum() * _VALLEY_SUMS[:, None]
+    arm = np.meshgrid(best.sum() * _ARM_FIRSTS, best.sum() * _ARM_SECONDS)
     grids, missed = [], None
-    for x_values, y_values in ((sums * _SHARES, sums * (1 - _SHARES)), arm):
+    for x_values, y_values in ((sums * _VALLEY_SHARES, sums * (1 - _VALLEY_SHARES)), arm):
         increases, lower = _increases(likelihood, pair, x_values, y_values)
-        grid = {"x_values": _listed(x_values, rounded), "y_values": _listed(y_values, rounded)}
-        grids.append({**grid, "increases": _listed(increases, round_increase)})
+        grid = {
+            "x_values": _rows_of(x_values, rounded),
+            "y_values": _rows_of(y_values, rounded),
+        }
+        grids.append({**grid, "increases": _rows_of(increases, round_increase)})
         missed = missed if lower is None else lower
     both = [model.parameters[index] for index in pair]
     x, y = ({"name": p.name, "symbol": p.symbol, "unit": p.unit} for p in both)
@@ -372,7 +375,7 @@ def compute_valley(likelihood: Likelihood) -> tuple[dict[str, Any] | None, Array
     return {"x": x, "y": y, "grids": grids, "best": at_best}, missed
 
 
-def _listed(values: Array, rounding: Callable[[float], float | None]) -> list[list[float | None]]:
+def _rows_of(values: Array, rounding: Callable[[float], float | None]) -> list[list[float | None]]:
     return [[rounding(float(value)) for value in row] for row in values]
 
 

@@ -15,9 +15,9 @@ from biogrip.physics.sample_model import SampleModel
 
 # Slopes of hinges: a relaxation time of twice the experiment increases chi^2 by some 50, and one
 # a hundredth above that of the next branch by 1.
-_WITHIN, _IN_ORDER = 10.0, 100.0
+_SLOPE_WITHIN, _SLOPE_IN_ORDER = 10.0, 100.0
 # E-folds from an end of a range at which a parameter counts as at it.
-_AT_END = 1e-6
+_AT_END_OF_MEMBER = 1e-6
 
 PROVIDED = "provided that the branch, k and c in series, relaxes within the experiment"
 """Condition of a sum of dampers, in the sentences of tables and pages."""
@@ -37,7 +37,7 @@ class BranchPenalty:
     @property
     def stiffness(self) -> float:
         """Slope of the residual, in standard deviations per e-fold."""
-        return _WITHIN if self.before is None else _IN_ORDER
+        return _SLOPE_WITHIN if self.before is None else _SLOPE_IN_ORDER
 
     def form(self, n_parameters: int) -> Array:
         """Return the coefficients, (n_parameters,), of its log (relative) relaxation time."""
@@ -107,7 +107,7 @@ class Quantity:
         members = list(self.members)
         rises = above[:, None] == (np.array(self.sign) > 0)
         ends = np.where(rises, high[members], low[members])
-        at_end = np.abs(log_parameters[:, members] - ends) < _AT_END
+        at_end = np.abs(log_parameters[:, members] - ends) < _AT_END_OF_MEMBER
         return np.any(at_end, axis=1) & (len(self.sign) > 1)
 
     def range(self, low: Array, high: Array) -> tuple[float, float]:
@@ -138,7 +138,7 @@ def parameters_and_sum(model: SampleModel) -> list[Quantity]:
     if len(exchangeable) < 2:
         return single
     within = tuple(BranchPenalty(branch) for branch in model.free_branches)
-    return [*single, replace(_sum(model, exchangeable), penalties=within)]
+    return [*single, replace(_sum_of(model, exchangeable), penalties=within)]
 
 
 def characteristic_times(model: SampleModel) -> list[Quantity]:
@@ -173,10 +173,10 @@ def find_combinations(model: SampleModel, members: list[int]) -> list[Quantity]:
         if not {first.kind, second.kind} <= {"stiffness", "damping"}:
             continue
         if first.kind == second.kind:
-            found += [_sum(model, (a, b)), _series(model, (a, b))]
+            found += [_sum_of(model, (a, b)), _series_combination(model, (a, b))]
         else:
             pair = (a, b) if first.kind == "damping" else (b, a)
-            names, symbols, _ = _named(model, pair)
+            names, symbols, _ = _names_of(model, pair)
             found.append(Quantity("/".join(names), "/".join(symbols), "s", pair, sign=(1, -1)))
     return [replace(quantity, penalties=ordered) for quantity in found]
 
@@ -186,18 +186,18 @@ def _ordered(model: SampleModel) -> tuple[BranchPenalty, ...]:
     return tuple(BranchPenalty(branch, later, model.branch_power) for branch, later in pairs)
 
 
-def _sum(model: SampleModel, members: tuple[int, ...]) -> Quantity:
-    names, symbols, unit = _named(model, members)
+def _sum_of(model: SampleModel, members: tuple[int, ...]) -> Quantity:
+    names, symbols, unit = _names_of(model, members)
     return Quantity(" + ".join(names), " + ".join(symbols), unit, members, 1)
 
 
-def _series(model: SampleModel, members: tuple[int, ...]) -> Quantity:
-    names, symbols, unit = _named(model, members)
+def _series_combination(model: SampleModel, members: tuple[int, ...]) -> Quantity:
+    names, symbols, unit = _names_of(model, members)
     label, symbol = (" + ".join(f"1/{each}" for each in texts) for texts in (names, symbols))
     return Quantity(f"1/({label})", f"$1/($ {symbol} $)$", unit, members, -1)
 
 
-def _named(model: SampleModel, members: tuple[int, ...]) -> tuple[list[str], list[str], str]:
+def _names_of(model: SampleModel, members: tuple[int, ...]) -> tuple[list[str], list[str], str]:
     """Return the names and symbols of parameters, and the unit of the first."""
     chosen = [model.parameters[index] for index in members]
     return [p.name for p in chosen], [p.symbol for p in chosen], chosen[0].unit

@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
+import biogrip.levels as levels
 from biogrip.arrays import Array
 from biogrip.digits import plain, with_limits, within_limits
-from biogrip.judging import levels
 from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.profiles import Profile, compute_profiles
 from biogrip.judging.quantities import Quantity, find_combinations

@@ -36,10 +36,10 @@ from functools import cached_property
 import numpy as np
 from scipy.special import betainc, betaincc, betaincinv, fdtrc, ndtr, ndtri, pdtrc, stdtr
 
+import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.digits import p_value, plain
 from biogrip.fit.noise_model_fit import absorbed
-from biogrip.judging import levels
 from biogrip.physics.noise import without
 from biogrip.physics.protocol import is_storage
 from biogrip.physics.residuals import Residuals

@@ -34,36 +34,30 @@ from typing import Any
 import numpy as np
 from scipy.special import chdtrc, chdtri, fdtri
 
+import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray
 from biogrip.digits import plain, with_limits
 from biogrip.fit.any_sample import AnySampleFit, Lags, count_lags, fit_any_sample
-from biogrip.judging import levels
 from biogrip.judging.verdicts import verdict_of
 from biogrip.judging.whiteness import as_correlated, correlated
 from biogrip.physics.residuals import Residuals
 
 # First digits of the times at which quantities are told and, where these are too few, of more.
-_DIGITS, _FEWEST_TIMES = ((1,), (1, 2, 5)), 2
+_FIRST_DIGITS, _FEWEST_TIMES = ((1,), (1, 2, 5)), 2
 # Weight of the row that holds a quantity, over its standard deviation or, if less, a share of it;
 # accuracies of the threshold's root, and of ends at which the excess jumps; share of the root that
 # is flat; most fits; growth of steps; most grids.
-_HELD = 0.1
-_WEIGHT, _ROUGH, _ACCURATE, _CLOSE, _FLAT = 300.0, 0.3, 0.02, 1e-3, 0.03
-_MOST_FITS, _LARGER, _MOST_DIVISIONS = 25, 4.0, 4
+_SHARE_HELD = 0.1
+_WEIGHT_HELD, _ROUGH_ROOT, _ACCURATE_ROOT, _JUMP_WIDTH, _FLAT_SHARE = 300.0, 0.3, 0.02, 1e-3, 0.03
+_MOST_TRIALS, _TRIAL_GROWTH, _MOST_GRIDS = 25, 4.0, 4
 # Least ratio of a time to the first, and of the last to it, for slopes and moduli.
 _INNER = 2.0
-# A limit hangs on what hardly shows if a noise of that changes the quantity so many times more.
-_HANGS = 10.0
 # Standard deviation of a quantity that counts as none, over the largest that a noise of one lag
 # makes; and a quantity that does, over its standard deviation.
-_LEAST, _ROUNDING = 1e-3, 1e-15
+_LEAST_DEVIATION, _NO_VALUE = 1e-3, 1e-15
 
-# Share of a value below which a lower limit says no more than that it is positive.
-_LITTLE = 0.01
-# Ratio beyond which an upper limit hangs on the fastest lag that is tried, and is not sought.
-_MOST = 1e4
 # Of moduli, compliances, their slopes, and viscosities: N and m, or Pa.
-_UNITS = {
+_UNITS_TOLD = {
     "N/m": ("N/m", "m/N", "m/(N s)", "N s/m"),
     "Pa": ("Pa", "1/Pa", "1/(Pa s)", "Pa s"),
     "": ("", "", "1/s", "s"),
@@ -75,8 +69,8 @@ KINDS = (LEVEL, EXPONENT, LOSS, BEYOND, FLOW, "storage", "loss tangent", "increm
 it is at once and at rest."""
 
 # What lags of unit amplitude add, (n_rates,), by a time in s and their rates in 1/s, (n_rates,).
-_Functional = Callable[[float, Array], Array]
-_ADDED: dict[str, _Functional] = {
+_Added = Callable[[float, Array], Array]
+_ADDED: dict[str, _Added] = {
     "left": lambda time_s, rates: np.exp(-rates * time_s),
     "yielded": lambda time_s, rates: -np.expm1(-rates * time_s),
     "per second": lambda time_s, rates: rates * np.exp(-rates * time_s),
@@ -92,7 +86,7 @@ _ADDED: dict[str, _Functional] = {
 
 
 @dataclass(frozen=True)
-class Told:
+class Estimate:
     """A quantity, and its limits over all linear samples."""
 
     quantity: str
@@ -129,7 +123,7 @@ class Told:
 class WithoutModel:
     """What a trace tells without a model."""
 
-    told: list[Told]
+    told: list[Estimate]
     """Quantities with their limits."""
     misfit: float
     """RMS of what the linear sample that fits best leaves, in the unit of the readings."""
@@ -196,9 +190,9 @@ def tell_without_model(
         independent, freedom = as_correlated(*left)
         sd = fit.sd * math.sqrt(free / independent)
     root = partial(_root, confidence, freedom, float(sd / residuals.noise_scale))
-    times_s = at_s or decades(*fit.lags.covered_s)
+    times_s = at_s or times_told(*fit.lags.covered_s)
     quantities = (each for each in _quantities(residuals, fit.lags, times_s) if each.kind in kinds)
-    told = [_told(fit, each, root) for each in quantities]
+    told = [_find_limits(fit, each, root) for each in quantities]
     return WithoutModel(told, fit.misfit, times, is_linear, fit.lags.covered_s)
 
 
@@ -209,10 +203,10 @@ def _root(confidence: float, freedom: float, sd: float, more: int) -> float:
     return sd * math.sqrt((1 + more) * fdtri(1 + more, freedom, confidence))
 
 
-def decades(first_s: float, last_s: float) -> list[float]:
+def times_told(first_s: float, last_s: float) -> list[float]:
     """Return powers of ten between two times or, of less than two, more round numbers."""
     powers = range(math.floor(math.log10(first_s)), math.floor(math.log10(last_s)) + 1)
-    for digits in _DIGITS:
+    for digits in _FIRST_DIGITS:
         times = [float(f"{digit}e{power}") for power in powers for digit in digits]
         inside = [time_s for time_s in times if first_s <= time_s <= last_s]
         if len(inside) >= _FEWEST_TIMES:
@@ -234,15 +228,15 @@ def level_turned(residuals: Residuals) -> Callable[[Any], Any] | None:
 
 
 @dataclass(frozen=True)
-class _Quantity:
+class _Functional:
     """A functional of the amplitudes of lags, or the ratio of two."""
 
     name: str
     kind: str
     at_s: float | None
     unit: str
-    above: _Functional
-    below: _Functional | None = None
+    above: _Added
+    below: _Added | None = None
     """What it is divided by."""
     sides: tuple[int, ...] = (-1, 1)
     """Sides on which it may have a limit, -1 or 1."""
@@ -258,29 +252,32 @@ class _Quantity:
         return self.above(at_s, lags.rates) * shown, below * shown
 
 
-def _told(fit: AnySampleFit, quantity: _Quantity, root: Callable[[int], float]) -> Told:
+def _find_limits(
+    fit: AnySampleFit, quantity: _Functional, root: Callable[[int], float]
+) -> Estimate:
     """Find the limits of a quantity that is not negative."""
-    profile = _Profile(fit, quantity, root)
+    profile = _Excess(fit, quantity, root)
     value: float | None = profile.best
     ends = [profile.limit(side) if side in quantity.sides else None for side in (-1, 1)]
     if (turned := quantity.turned) is not None:
         value, *ends = (turned(it) if it else None for it in (value, *ends[::-1]))
     low, high = (float(end) if end is not None and end > 0 else None for end in ends)
-    if quantity.below is not None and max(value or 0.0, high or 0.0) > _MOST:
+    if quantity.below is not None and max(value or 0.0, high or 0.0) > levels.OF_THE_FASTEST:
         value, high = None, None
     # Of a flow that is hardly there the value is any.
-    little = 0.0 if quantity.kind == FLOW else _LITTLE * max(value or 0.0, _LITTLE * (high or 0.0))
+    largest = max(value or 0.0, levels.LITTLE * (high or 0.0))
+    little = 0.0 if quantity.kind == FLOW else levels.LITTLE * largest
     if low is not None and low < little:
         low = None
     value = None if low is None or high is None or value is None else float(value)
-    return Told(quantity.name, quantity.kind, quantity.at_s, quantity.unit, value, low, high)
+    return Estimate(quantity.name, quantity.kind, quantity.at_s, quantity.unit, value, low, high)
 
 
-class _Profile:
+class _Excess:
     """The root of the least excess of the sum of squares, as a function of a quantity."""
 
     def __init__(
-        self, fit: AnySampleFit, quantity: _Quantity, root: Callable[[int], float]
+        self, fit: AnySampleFit, quantity: _Functional, root: Callable[[int], float]
     ) -> None:
         self._fit, self._quantity, self._root = fit, quantity, root
         self._least = float(fit.left @ fit.left)
@@ -291,17 +288,17 @@ class _Profile:
         row, own, faint = above - self.best * below, fit.amplitudes > 0, fit.lags.faint
         clearly = float(np.abs(row[~faint]).max())
         deviation = float(np.linalg.norm(np.linalg.lstsq(fit.lags.rows[own], row[own])[0]))
-        deviation = deviation if deviation > _LEAST * clearly else clearly
+        deviation = deviation if deviation > _LEAST_DEVIATION * clearly else clearly
         stride = root(0) * deviation / (divisor or 1.0)
         # Of a liquid the modulus that another is divided by may vanish.
-        self._stride = min(stride, _MOST) if quantity.below else stride
+        self._stride = min(stride, levels.OF_THE_FASTEST) if quantity.below else stride
         self._deviation, self._divisor = deviation, divisor
-        self._open = [it for it in (-1, 1) if np.any(it * row[faint] > _HANGS * clearly)]
+        self._open = [it for it in (-1, 1) if np.any(it * row[faint] > levels.HANGS * clearly)]
 
     def limit(self, side: int) -> float | None:
         """Find the limit on a side, -1 or 1, if there is one."""
         # Beside its standard deviation it may be rounding.
-        nothing = side < 0 and self.best <= _ROUNDING * self._stride
+        nothing = side < 0 and self.best <= _NO_VALUE * self._stride
         if not 0 < self._stride < math.inf or side in self._open or nothing:
             return None
         found, needed = self._closely(side, self.best + side * self._stride, self._root(0))
@@ -312,15 +309,15 @@ class _Profile:
 
     def _closely(self, side: int, value: float, root: float) -> tuple[float | None, BoolArray]:
         """Find a limit roughly, then with closer lags, beginning with a value; and its lags."""
-        lags, accuracy = self._fit.lags, _ROUGH
-        for _ in range(_MOST_DIVISIONS):
+        lags, accuracy = self._fit.lags, _ROUGH_ROOT
+        for _ in range(_MOST_GRIDS):
             found, needed = self._crossing(lags, side, value, root, accuracy)
             if found is None or side * (found - self.best) < 0:
                 # Where the excess jumps, Newton's method may end on the other side.
                 return None, needed
-            if accuracy < _ROUGH and lags.are_close(needed):
+            if accuracy < _ROUGH_ROOT and lags.are_close(needed):
                 break
-            lags, value, accuracy = lags.divided(needed), found, _ACCURATE
+            lags, value, accuracy = lags.divided(needed), found, _ACCURATE_ROOT
         return found, needed
 
     def _crossing(
@@ -335,11 +332,11 @@ class _Profile:
         rows = np.column_stack((lags.rows, above))
         measured = np.append(self._fit.measured, 0.0)
         inner, outer = self.best, math.inf
-        for _ in range(_MOST_FITS):
+        for _ in range(_MOST_TRIALS):
             value = value if side > 0 else max(value, 0.0)
             # Rounding of a row that is far heavier than its value takes would outweigh the trace.
-            held = min(self._deviation, _HELD * max(value, self.best) * self._divisor)
-            weight = _WEIGHT / held
+            held = min(self._deviation, _SHARE_HELD * max(value, self.best) * self._divisor)
+            weight = _WEIGHT_HELD / held
             rows[:, -1] = np.where(seen, weight * (above - value * below), 0.0)
             measured[-1] = 0.0 if ratio else weight * value
             amplitudes, norm = nnls(rows.T, measured, maxiter=100 * len(rows))
@@ -350,24 +347,24 @@ class _Profile:
             force = weight * float(measured[-1] - amplitudes @ rows[:, -1])
             slope = force * (float(below @ amplitudes) if ratio else 1.0)
             # Where the excess is flat, its slope says nothing.
-            steep = side * slope > 0 and reached > _FLAT * root
+            steep = side * slope > 0 and reached > _FLAT_SHARE * root
             step = -over * reached / slope if steep else side * math.inf
             if abs(over) < accuracy * root:
                 return value + (step if steep and math.isfinite(step) else 0.0), amplitudes > 0
             inner, outer = (value, outer) if over < 0 else (inner, value)
-            if abs(outer - inner) < _CLOSE * abs(inner - self.best):
+            if abs(outer - inner) < _JUMP_WIDTH * abs(inner - self.best):
                 return inner, amplitudes > 0
-            far = outer if math.isfinite(outer) else self.best + _LARGER * (value - self.best)
+            far = outer if math.isfinite(outer) else self.best + _TRIAL_GROWTH * (value - self.best)
             if far == inner:
                 break
             share = (value + step - inner) / (far - inner)
-            if far == outer and not _CLOSE < share < 1 - _CLOSE:
+            if far == outer and not _JUMP_WIDTH < share < 1 - _JUMP_WIDTH:
                 share = 0.5
             value = inner + min(share, 1.0) * (far - inner)
         return None, seen
 
 
-def _quantities(residuals: Residuals, lags: Lags, times: Sequence[float]) -> Iterator[_Quantity]:
+def _quantities(residuals: Residuals, lags: Lags, times: Sequence[float]) -> Iterator[_Functional]:
     """Yield what is told at times, and beyond the readings."""
     instrument, (first_s, last_s) = residuals.instrument, lags.covered_s
     deforms, jaws, turned = instrument.deforms, instrument.has_jaws, level_turned(residuals)
@@ -375,30 +372,30 @@ def _quantities(residuals: Residuals, lags: Lags, times: Sequence[float]) -> Ite
     # Slopes and moduli at an end of the trace are hardly known.
     inner = [time_s for time_s in inside if _INNER * first_s <= time_s <= last_s / _INNER]
     stiffness = instrument.stiffness
-    letter, (unit, *of_creep) = "K" if stiffness == "N/m" else "G", _UNITS[stiffness]
+    letter, (unit, *of_creep) = "K" if stiffness == "N/m" else "G", _UNITS_TOLD[stiffness]
     if not (deforms or jaws):
         letter, unit = "J", of_creep[0]
     # What falls is not smaller before the first reading, and not larger after the last one.
     falls, level = (1, _ADDED["left"]) if deforms else (-1, _ADDED["yielded"])
     for at_s in times:
         sides = (-falls,) * (at_s <= last_s) + (falls,) * (at_s >= first_s)
-        yield _Quantity(f"{letter}({at_s:g} s)", LEVEL, at_s, unit, level, None, sides, turned)
+        yield _Functional(f"{letter}({at_s:g} s)", LEVEL, at_s, unit, level, None, sides, turned)
     for at_s in inner if not jaws else ():
-        yield _Quantity(f"exponent({at_s:g} s)", EXPONENT, at_s, "", _ADDED["per e-fold"], level)
-    yield _Quantity(f"{letter} at once", BEYOND, first_s, unit, level, None, (-falls,), turned)
+        yield _Functional(f"exponent({at_s:g} s)", EXPONENT, at_s, "", _ADDED["per e-fold"], level)
+    yield _Functional(f"{letter} at once", BEYOND, first_s, unit, level, None, (-falls,), turned)
     if deforms or jaws:
         final = _ADDED["lasting" if deforms else "all"]
-        yield _Quantity(f"{letter} at rest", BEYOND, None, unit, final, None, (falls,), turned)
+        yield _Functional(f"{letter} at rest", BEYOND, None, unit, final, None, (falls,), turned)
     if jaws:
         return
     if not deforms:
         for before_s, at_s in pairwise(inside):
             name = f"J({before_s:g} to {at_s:g} s)"
-            yield _Quantity(name, "increment", at_s, unit, partial(_rise, before_s))
+            yield _Functional(name, "increment", at_s, unit, partial(_rise, before_s))
         _, per_s, viscosity = of_creep
-        yield _Quantity("slope at the end", "slope", last_s, per_s, _ADDED["per second"])
+        yield _Functional("slope at the end", "slope", last_s, per_s, _ADDED["per second"])
         flow = _ADDED["flowing"]
-        yield _Quantity("viscosity", FLOW, None, viscosity, flow, None, (1,), lambda it: 1 / it)
+        yield _Functional("viscosity", FLOW, None, viscosity, flow, None, (1,), lambda it: 1 / it)
     # Under a step of the deformation the fastest lag, of a damper, does not show.
     fastest = 1 / first_s if deforms and not lags.rows[-1].any() else math.inf
     stored, lost = _ADDED["slow" if deforms else "fast"], _ADDED["lost"]
@@ -409,7 +406,7 @@ def _quantities(residuals: Residuals, lags: Lags, times: Sequence[float]) -> Ite
             ("tan delta", "loss tangent", "", lost, stored),
         ):
             name = f"{name}({1 / at_s:.3g} rad/s)"
-            yield _Quantity(name, kind, at_s, its, above, below, fastest=fastest)
+            yield _Functional(name, kind, at_s, its, above, below, fastest=fastest)
 
 
 def _rise(before_s: float, time_s: float, rates: Array) -> Array:

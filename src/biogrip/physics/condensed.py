@@ -32,12 +32,12 @@ from biogrip.physics.noise import Whitening, without
 from biogrip.physics.protocol import Course
 from biogrip.physics.rate_tables import ModeRows, SpanningModes
 
-_NODES = 20
-_DEGREE = _NODES - 1
-_PLACES = chebyshev.chebpts1(_NODES)
+_NODES_A_PIECE = 20
+_DEGREE_OF_PIECE = _NODES_A_PIECE - 1
+_NODES_OF_PIECE = chebyshev.chebpts1(_NODES_A_PIECE)
 # From values at the nodes to coefficients of Legendre polynomials, which are nearly orthogonal
 # over readings that are dense all over a piece.
-_TO_SERIES = np.linalg.inv(legendre.legvander(_PLACES, _DEGREE))
+_TO_LEGENDRE = np.linalg.inv(legendre.legvander(_NODES_OF_PIECE, _DEGREE_OF_PIECE))
 # Fewer readings are their own nodes; so are those whose polynomials are worse conditioned.
 _FEWEST_READINGS, _LARGEST_CONDITION = 256, 10.0
 # Most nodes of which orthonormal functions are kept for the next trace.
@@ -108,10 +108,10 @@ class DenseSamples:
         elapsed = start - self._starts_s[self._starts_s.searchsorted(start, side="right") - 1]
         if end - start <= elapsed:
             place = (2 * self._all_s[here] - start - end) / (end - start)
-            basis, triangle = np.linalg.qr(legendre.legvander(place, _DEGREE))
+            basis, triangle = np.linalg.qr(legendre.legvander(place, _DEGREE_OF_PIECE))
             if np.linalg.cond(triangle / np.linalg.norm(triangle, axis=0)) <= _LARGEST_CONDITION:
-                nodes_s = 0.5 * (start + end) + 0.5 * (end - start) * _PLACES
-                yield _Piece(here, nodes_s, basis, _TO_SERIES.T @ triangle.T)
+                nodes_s = 0.5 * (start + end) + 0.5 * (end - start) * _NODES_OF_PIECE
+                yield _Piece(here, nodes_s, basis, _TO_LEGENDRE.T @ triangle.T)
                 return
         half = first + int(np.searchsorted(self._all_s[here], 0.5 * (start + end)))
         yield from self._divided(first, half)

@@ -41,28 +41,30 @@ from biogrip.physics.sample_model import C_P, K_P, C, K, Network, Parameter, Sam
 SHORTEST_S, LONGEST_S = 1e-5, 1e5
 """Range of times, and of reciprocal rates, in which the ladder is a springpot to 1e-6."""
 
-_STEP, _COUNT = 0.6, 45
+_LADDER_STEP, _LADDER_RATES = 0.6, 45
 _SLOWEST_PER_S = 0.5e-5
-_NODES = 3
+_ENDS = 3
 
-_RATES = _SLOWEST_PER_S * np.exp(_STEP * np.arange(_COUNT))
+_RATES = _SLOWEST_PER_S * np.exp(_LADDER_STEP * np.arange(_LADDER_RATES))
 # The first rate left out is e^-h times the last one kept; the nodes go a little beyond.
-_PLACES = np.exp(-_STEP / 2) * (np.sin(np.pi * np.arange(_NODES + 1) / (2 * _NODES + 1)) ** 2)
+_END_PLACES = np.exp(-_LADDER_STEP / 2) * (
+    np.sin(np.pi * np.arange(_ENDS + 1) / (2 * _ENDS + 1)) ** 2
+)
 
 BRANCH_RATES_PER_S: Array = np.concatenate(
-    (_SLOWEST_PER_S * _PLACES[1:], _RATES, _RATES[-1] / _PLACES[:0:-1])
+    (_SLOWEST_PER_S * _END_PLACES[1:], _RATES, _RATES[-1] / _END_PLACES[:0:-1])
 )
 """Rates at which the branches of every springpot relax, ascending."""
 
 
 # Ascending coefficients of the Lagrange polynomials of the places.
-_TO_WEIGHTS = np.linalg.inv(np.vander(_PLACES, increasing=True)).T
+_TO_WEIGHTS = np.linalg.inv(np.vander(_END_PLACES, increasing=True)).T
 
-_LEAST_EXPONENT = 2.0**-44
+_NEXT_TO_SPRING = 2.0**-44
 # Spring of a branch that equal ladders in series do not have, in N/m: no response shows it.
-_SPRING_OF_NO_BRANCH = 1e-30
+_SPRING_OF_EQUAL_LADDERS = 1e-30
 # Least relative distance of the rates of two springpots in series.
-_LEAST_GAP_OF_RATES = 2e-6
+_LEAST_GAP_OF_LADDERS = 2e-6
 
 
 @dataclass(frozen=True)
@@ -116,7 +118,7 @@ def damper(c: NDArray[Any]) -> Ladder:
     return Ladder(0 * c, c, 0 * c[None])
 
 
-def series(first: Ladder, second: Ladder) -> Network:
+def in_series(first: Ladder, second: Ladder) -> Network:
     """Return the network of ladders in series; one of the two has branches."""
     both = first + second
     poles = _POLES[:, None] * np.ones(len(both.spring))
@@ -128,10 +130,10 @@ def series(first: Ladder, second: Ladder) -> Network:
     springs = ((1 - share) * of_first - share * of_second) ** 2 / steepness
     rates = zeros.values
     if np.all(product := first.springs * second.springs):
-        springs = np.where(springs == 0, _SPRING_OF_NO_BRANCH, springs)
+        springs = np.where(springs == 0, _SPRING_OF_EQUAL_LADDERS, springs)
         shared, own = product / both.springs, springs[1:]
         # Rates that are nearly equal cost digits: apart, with the same mean, they do not.
-        lack = np.maximum(_LEAST_GAP_OF_RATES * poles[1:] - (rates[1:] - poles[1:]).real, 0)
+        lack = np.maximum(_LEAST_GAP_OF_LADDERS * poles[1:] - (rates[1:] - poles[1:]).real, 0)
         share = shared / (shared + own)
         rates[1:] += lack * share
         rates = np.concatenate((rates, poles[1:] - lack * (1 - share)))
@@ -151,30 +153,30 @@ def ladder(modulus_N_per_m: NDArray[Any], exponent: NDArray[Any]) -> Ladder:
     analytic function.
     """
     # At 0 and 1, where tails would be infinite, the next exponent gives the same response.
-    exponent = np.where(exponent == 0, _LEAST_EXPONENT, exponent)
-    exponent = np.where(exponent == 1, 1 - _LEAST_EXPONENT, exponent)
+    exponent = np.where(exponent == 0, _NEXT_TO_SPRING, exponent)
+    exponent = np.where(exponent == 1, 1 - _NEXT_TO_SPRING, exponent)
     # sin(pi alpha), with all digits near one, too.
     near = np.where(np.real(exponent) > 0.5, 1 - exponent, exponent)
-    density = modulus_N_per_m * _STEP * np.sin(np.pi * near) / np.pi
+    density = modulus_N_per_m * _LADDER_STEP * np.sin(np.pi * near) / np.pi
     springs = density * np.exp(exponent * np.log(_RATES)[:, None])
     slow = springs[0] * _tail(exponent)
     fast = springs[-1] * _tail(1 - exponent)
-    within = (slow[1:], springs, fast[:0:-1] / _PLACES[:0:-1, None])
+    within = (slow[1:], springs, fast[:0:-1] / _END_PLACES[:0:-1, None])
     return Ladder(slow[0], fast[0] / _RATES[-1], np.concatenate(within))
 
 
 def _tail(exponent: NDArray[Any]) -> NDArray[Any]:
     """Return weights at the nodes with the moments of e^(-a j h), j = 1, 2, ..., at e^(-j h)."""
-    powers = exponent + np.arange(_NODES + 1)[:, None]
-    return np.einsum("mk,kn->mn", _TO_WEIGHTS, 1 / np.expm1(_STEP * powers))
+    powers = exponent + np.arange(_ENDS + 1)[:, None]
+    return np.einsum("mk,kn->mn", _TO_WEIGHTS, 1 / np.expm1(_LADDER_STEP * powers))
 
 
 def _liquid(k_alpha: Array, alpha: Array, c: Array) -> Network:
-    return series(damper(c), ladder(k_alpha, alpha))
+    return in_series(damper(c), ladder(k_alpha, alpha))
 
 
 def _gel(k: Array, k_alpha: Array, alpha: Array) -> Network:
-    return series(spring(k), ladder(k_alpha, alpha))
+    return in_series(spring(k), ladder(k_alpha, alpha))
 
 
 def _beside(network: Network, k_p: Array | float = 0.0, c_p: Array | float = 0.0) -> Network:
@@ -211,7 +213,7 @@ _TWO = (
     replace(_K_ALPHA, name="k_beta", meaning="other springpot, modulus at 1 rad/s"),
     replace(_ALPHA, name="beta", meaning="exponent of the other springpot, below alpha"),
 )
-_IN_ORDER = (("k_beta", "beta"), ("k_alpha", "alpha"))
+_SPRINGPOTS_IN_ORDER = (("k_beta", "beta"), ("k_alpha", "alpha"))
 
 FRACTIONAL_MODELS = (
     SampleModel(
@@ -250,7 +252,7 @@ FRACTIONAL_MODELS = (
         _TWO,
         of_columns(lambda *both: (ladder(*both[:2]) + ladder(*both[2:])).network),
         example=(20.0, 0.8, 5.0, 0.2),
-        branches=_IN_ORDER,
+        branches=_SPRINGPOTS_IN_ORDER,
         contains={
             "fractional_kelvin_voigt": lambda k_p, k_alpha, alpha: (k_alpha, alpha, k_p, 0.0),
             "springpot_beside_damper": lambda k_alpha, alpha, c_p: (c_p, 1.0, k_alpha, alpha),
@@ -282,9 +284,9 @@ FRACTIONAL_MODELS = (
         "springpots_in_series",
         "two springpots in series",
         _TWO,
-        of_columns(lambda *both: series(ladder(*both[:2]), ladder(*both[2:]))),
+        of_columns(lambda *both: in_series(ladder(*both[:2]), ladder(*both[2:]))),
         example=(60.0, 0.8, 10.0, 0.2),
-        branches=_IN_ORDER,
+        branches=_SPRINGPOTS_IN_ORDER,
         contains={
             "fractional_maxwell": lambda k_alpha, alpha, c: (c, 1.0, k_alpha, alpha),
             "fractional_maxwell_gel": lambda k, k_alpha, alpha: (k_alpha, alpha, k, 0.0),

@@ -94,9 +94,14 @@ class Gripper(Block):
 
 
 # Far below what any sample has, in any units; the squares of its reciprocals are no overflow.
-_NOTHING = 1e-40
+_TINY = 1e-40
 
-NO_ARMS = Gripper(math.sqrt(0.5), 90.0, Arm(0.0, _NOTHING, _NOTHING), Arm(0.0, _NOTHING, _NOTHING))
+NO_ARMS = Gripper(
+    math.sqrt(0.5),
+    90.0,
+    Arm(0.0, _TINY, _TINY),
+    Arm(0.0, _TINY, _TINY),
+)
 """Arms that do nothing: with a squared lever of 1/2 they turn by what a sample creeps."""
 
 
@@ -197,7 +202,7 @@ class Contact:
     """Voltage that gives this torque."""
 
 
-def contact(neutral: Gripper, jaw_gap_m: float, comb: CombDrive, size_m: float) -> Contact:
+def find_contact(neutral: Gripper, jaw_gap_m: float, comb: CombDrive, size_m: float) -> Contact:
     """Compute the configuration of arms closed symmetrically onto a sample of a diameter.
 
     Given are the gripper with its neutral angle as the reference angle, the distance between the

@@ -32,8 +32,8 @@ from biogrip.physics.sample_model import (
     Parameter,
     SampleModel,
     Turned,
-    in_units,
     of_columns,
+    with_stiffness_unit,
 )
 
 K_S = Parameter("k_s", "stiffness", "series spring", "k")
@@ -114,7 +114,7 @@ def _to_maxwell(k_s: Array, k_v: Array, c_v: Array) -> tuple[Array, ...]:
     return share * k_s, share * k_v, share**2 * c_v
 
 
-def _one_branch_more(*parameters: Array) -> tuple[Array | float, ...]:
+def _with_empty_branch(*parameters: Array) -> tuple[Array | float, ...]:
     half = len(parameters) // 2
     springs, dampers = parameters[: half - 1], parameters[half:-1]
     return *springs, 0.0, parameters[half - 1], *dampers, 0.0, parameters[-1]
@@ -135,9 +135,9 @@ def _with_branches(branches: int) -> SampleModel:
     numbers = range(1, branches + 1)
     springs = tuple(replace(K, name=f"k_{j}", meaning=f"spring of branch {j}") for j in numbers)
     dampers = tuple(replace(C, name=f"c_{j}", meaning=f"damper of branch {j}") for j in numbers)
-    contains: dict[str, Turned] = {f"generalized_maxwell_{branches - 1}": _one_branch_more}
+    contains: dict[str, Turned] = {f"generalized_maxwell_{branches - 1}": _with_empty_branch}
     if branches == 2:
-        contains = {"generalized_maxwell": _one_branch_more, "burgers": _two_branches}
+        contains = {"generalized_maxwell": _with_empty_branch, "burgers": _two_branches}
     return replace(
         GENERALIZED_MAXWELL,
         title=f"{GENERALIZED_MAXWELL.title}, {branches} branches",
@@ -258,7 +258,7 @@ class Sample:
             if model is not GENERALIZED_MAXWELL:
                 raise ValueError(f"{self.name} has no number of branches")
             model = _with_branches(self.branches)
-        return model if self.stiffness == "N/m" else in_units(model, self.stiffness)
+        return model if self.stiffness == "N/m" else with_stiffness_unit(model, self.stiffness)
 
     @property
     def candidate(self) -> str:

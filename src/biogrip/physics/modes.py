@@ -41,9 +41,9 @@ _COMPLEX_STEP = 1e-30
 # Rate at which a bare damper forgets, in 1/s; its force is c times the rate of the deformation.
 _RATE_OF_A_DAMPER = 1e30
 # Numbers formed together, which should fit a processor's cache.
-_NUMBERS_AT_ONCE = 400_000
+_MODE_NUMBERS_AT_ONCE = 400_000
 # Phases, and steps of a recursion, that are taken one by one.
-_FEW = 50
+_MOST_ONE_BY_ONE = 50
 
 
 class Modes(NamedTuple):
@@ -83,7 +83,7 @@ def sum_of_modes(modes: Modes, course: Course, time_s: Array) -> Array:
     by_slope[:, 1:] = modes.weights[:, None] * modes.rate_slopes
     mixing = np.concatenate((by_response, by_slope), axis=2)
     rows = np.zeros((n, 1 + count, len(time_s)))
-    for some in parts(n, max(1, _NUMBERS_AT_ONCE // (m * len(time_s)))):
+    for some in parts(n, max(1, _MODE_NUMBERS_AT_ONCE // (m * len(time_s)))):
         for here, both in responses_in_turn(modes.rates[some], course, time_s):
             # One product per sample: the order of its sums does not depend on their number.
             rows[some, :, here] = mixing[some] @ np.concatenate(both, axis=1)
@@ -115,53 +115,85 @@ def compute_modes(
     return Modes(rates, weights, *((of[1:].imag / _COMPLEX_STEP).swapaxes(0, 1) for of in both))
 
 
+class _SeenBranch(NamedTuple):
+    """A branch of the impedance seen from rates of modes, and derivatives by the log-parameters."""
+
+    weight: Array
+    """K_j, (n,)."""
+    rate: Array
+    """r_j, (n,)."""
+    weight_slope: Array
+    """(n_parameters, n)."""
+    rate_slope: Array
+    """(n_parameters, n)."""
+    inverse: Array
+    """1/(x - r_j), (n_modes, n)."""
+    ratio: Array
+    """x/(x - r_j), (n_modes, n)."""
+
+    @property
+    def moves(self) -> bool:
+        """True if its rate depends on the parameters."""
+        return bool(self.rate_slope.any())
+
+
 def _between_arms(
     gripper: Gripper, network: Network, count: int
 ) -> tuple[Array, Array, Array, Array]:
     """Compute rates and weights of the left arm, (n_modes, n), and derivatives of both.
 
-    These are by the log-parameters, (n_parameters, n_modes, n). With H(x; p) = 0 at a rate, dx =
-    (sum_j dK_j/(x - r_j) + ...) / (S/x^2); S and N follow. The network has n samples, and after
-    them the same with each of `count` parameters tilted by the complex step.
+    These are by the log-parameters, (n_parameters, n_modes, n). The rates x are the zeros of the
+    impedance H(x; p). With H(x; p) = 0 at a rate, dx = (sum_j dK_j/(x - r_j) + ...) / (S/x^2); the
+    steepness S and the numerators N follow, and the weights, -N/S. The network has n samples, and
+    after them the same with each of `count` parameters tilted by the complex step.
     """
     arms = Arms(gripper)
-    given = arms.with_sample(network)
-    parts = [
-        of.reshape(*of.shape[:-1], count + 1, -1)
-        for of in (given.weights, given.rates, given.level)
+    tilted = arms.with_sample(network)
+    every = [
+        part.reshape(*part.shape[:-1], count + 1, -1)
+        for part in (tilted.weights, tilted.rates, tilted.level)
     ]
-    impedance = Impedance(*(of[..., 0, :].real for of in parts))
-    # (n_parameters, n) of every weight and rate, and of the level.
-    d_weights, d_rates, d_level = (of[..., 1:, :].imag / _COMPLEX_STEP for of in parts)
+    impedance = Impedance(*(part[..., 0, :].real for part in every))
+    slopes = [part[..., 1:, :].imag / _COMPLEX_STEP for part in every]
     zeros = impedance.zeros()
-    x = zeros.values
-    moved = np.zeros((count, *x.shape)) - d_level[:, None]
-    steepness = np.zeros_like(x)
-    branches = []
-    for weight, rate, d_weight, d_rate in zip(
-        impedance.weights, impedance.rates, d_weights, d_rates, strict=True
-    ):
-        inverse = 1 / zeros.from_pole(rate)
-        ratio = x * inverse
-        steepness += weight * ratio**2
-        if not count:
-            continue
-        moves = d_rate.any()
-        moved += d_weight[:, None] * inverse
-        if moves:
-            moved += (weight * d_rate)[:, None] * (inverse * inverse)
-        branches.append((weight, rate, d_weight, d_rate if moves else None, inverse, ratio))
-    moved *= x * x / steepness
-    steepening = np.zeros_like(moved)
-    for weight, rate, d_weight, d_moving, inverse, ratio in branches:
-        away = 2 * weight * rate * ratio * inverse * inverse
-        steepening += d_weight[:, None] * (ratio * ratio) - moved * away
-        if d_moving is not None:
-            steepening += d_moving[:, None] * (2 * weight * (ratio * inverse) * ratio)
-    numerators, slopes = (of[LEFT] for of in arms.rotations(zeros))
+    inverses = [1 / zeros.from_pole(rate) for rate in impedance.rates]
+    ratios = [zeros.values * inverse for inverse in inverses]
+    parts_of_all = impedance.weights, impedance.rates, *slopes[:2], inverses, ratios
+    branches = [_SeenBranch(*of_one) for of_one in zip(*parts_of_all, strict=True)]
+    steepness = sum(
+        (branch.weight * branch.ratio**2 for branch in branches), np.zeros_like(zeros.pole)
+    )
+    moved = _moved_zeros(zeros.values, steepness, branches if count else [], slopes[2])
+    steepening = _steepening(moved, branches if count else [])
+    numerators, numerator_slopes = (of_arms[LEFT] for of_arms in arms.rotations(zeros))
     weights = -numerators / steepness
-    weight_slopes = -(slopes * moved + weights * steepening) / steepness
-    return -x, weights, -moved, weight_slopes
+    weight_slopes = -(numerator_slopes * moved + weights * steepening) / steepness
+    return -zeros.values, weights, -moved, weight_slopes
+
+
+def _moved_zeros(
+    x: Array, steepness: Array, branches: Sequence[_SeenBranch], level_slope: Array
+) -> Array:
+    """Return the derivatives of zeros x, (n_parameters, n_modes, n)."""
+    moved = np.zeros((len(level_slope), *x.shape)) - level_slope[:, None]
+    for branch in branches:
+        moved += branch.weight_slope[:, None] * branch.inverse
+        if branch.moves:
+            pull = (branch.weight * branch.rate_slope)[:, None]
+            moved += pull * (branch.inverse * branch.inverse)
+    moved *= x * x / steepness
+    return moved
+
+
+def _steepening(moved: Array, branches: Sequence[_SeenBranch]) -> Array:
+    """Return the derivatives of the steepness at zeros that move, (n_parameters, n_modes, n)."""
+    steepening = np.zeros_like(moved)
+    for weight, rate, weight_slope, rate_slope, inverse, ratio in branches:
+        away = 2 * weight * rate * ratio * inverse * inverse
+        steepening += weight_slope[:, None] * (ratio * ratio) - moved * away
+        if rate_slope.any():
+            steepening += rate_slope[:, None] * (2 * weight * (ratio * inverse) * ratio)
+    return steepening
 
 
 def elements_of(network: Network) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -208,7 +240,7 @@ def responses_in_turn(
     if course.sweeps:
         yield slice(None), moduli_of_modes(rates, time_s)[: 1 + slopes]
         return
-    at_once = max(1, _NUMBERS_AT_ONCE // max(rates.size, 1))
+    at_once = max(1, _MODE_NUMBERS_AT_ONCE // max(rates.size, 1))
     lengths = np.diff(course.time_s, append=course.end_s)
     # What precedes a step is read at its instant.
     firsts = np.append(time_s.searchsorted(course.time_s, side="right"), len(time_s))
@@ -278,7 +310,7 @@ class _Motion:
         """Return what remains of modes after times in phases, and what they gain in these."""
         at: Array = elapsed_s
         same: IntArray | slice = slice(None)
-        if len(self._powers) > _FEW:
+        if len(self._powers) > _MOST_ONE_BY_ONE:
             # Rows at equal intervals are few different times apart.
             at, same = np.unique(elapsed_s, return_inverse=True)
         orders = np.flatnonzero(np.any(self._powers, axis=0))
@@ -294,7 +326,7 @@ class _Motion:
 def _recursion(first: Array, factors: Array, terms: Array) -> Array:
     """Return x_0 ... x_n, x_(k+1) = factors_k x_k + terms_k; many steps are taken in blocks."""
     count = terms.shape[-1]
-    block = int(np.sqrt(count)) if count > _FEW else 1
+    block = int(np.sqrt(count)) if count > _MOST_ONE_BY_ONE else 1
     blocks = -(-count // block)
     padding = [(0, 0)] * (terms.ndim - 1) + [(0, blocks * block - count)]
     scale, within = (

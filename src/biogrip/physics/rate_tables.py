@@ -28,7 +28,7 @@ from biogrip.arrays import Array, IntArray
 from biogrip.physics.modes import Modes, respond
 
 # Width and degree of wide pieces, and number of short pieces in one for sums and for rows.
-_WIDTH, _DEGREE = 0.25, 11
+_PIECE_WIDTH, _WIDE_DEGREE = 0.25, 11
 _SHORTER, _SHORTER_OF_ROWS = 32, 16
 _ORDERS = np.arange(6)
 # exp(-40) is lost in rounding: beyond, only what has not begun to decay is left.
@@ -37,32 +37,38 @@ _DECAYED = 40.0
 # Spacing in u of the rates to choose modes from, and of times on a logarithmic scale.
 _SPACING_OF_RATES, _SPACING_OF_TIMES = 0.05, 0.1
 # What is left of a mode beside those chosen, relative to the first.
-_LEFT_OUT = 1e-14
+_LEAST_LEFT = 1e-14
 
 # Chebyshev's nodes on (0, 1).
-_NODES, _SHORT_NODES = (
-    0.5 + 0.5 * chebyshev.chebpts1(count) for count in (_DEGREE + 1, len(_ORDERS))
+_WIDE_NODES, _SHORT_NODES = (
+    0.5 + 0.5 * chebyshev.chebpts1(count) for count in (_WIDE_DEGREE + 1, len(_ORDERS))
 )
 
 
-def _series(places: Array, degree: int) -> NDArray[np.floating]:
+def _chebyshev(places: Array, degree: int) -> NDArray[np.floating]:
     """Evaluate Chebyshev polynomials on (0, 1), (n_places, degree + 1)."""
     return chebyshev.chebvander(2 * places - 1, degree)
 
 
-_TO_SERIES = np.linalg.inv(_series(_SHORT_NODES, len(_ORDERS) - 1)).T
+_TO_CHEBYSHEV = np.linalg.inv(_chebyshev(_SHORT_NODES, len(_ORDERS) - 1)).T
 # Power coefficients of Chebyshev polynomials on (0, 1), one in each row.
-_SERIES = (Chebyshev.basis(n, domain=(0, 1)).convert(kind=Polynomial).coef for n in _ORDERS)
-_TO_POWERS: Array = np.array([np.pad(each, (0, len(_ORDERS) - len(each))) for each in _SERIES])
+_CHEBYSHEV_POWERS = (
+    Chebyshev.basis(n, domain=(0, 1)).convert(kind=Polynomial).coef for n in _ORDERS
+)
+_TO_POWERS: Array = np.array(
+    [np.pad(each, (0, len(_ORDERS) - len(each))) for each in _CHEBYSHEV_POWERS]
+)
 
 
 def _in_short_pieces(values: Array, shorter: int) -> Array:
     """Turn values at the nodes of wide pieces, (..., 12), into powers, (..., shorter, 6)."""
     places = (np.arange(shorter)[:, None] + _SHORT_NODES).ravel() / shorter
-    to_short = np.linalg.solve(_series(_NODES, _DEGREE).T, _series(places, _DEGREE).T)
+    to_short = np.linalg.solve(
+        _chebyshev(_WIDE_NODES, _WIDE_DEGREE).T, _chebyshev(places, _WIDE_DEGREE).T
+    )
     short = (values @ to_short).reshape(*values.shape[:-1], shorter, len(_ORDERS))
     # A direct conversion of values to powers would lose digits by cancellation.
-    return short @ _TO_SERIES @ _TO_POWERS
+    return short @ _TO_CHEBYSHEV @ _TO_POWERS
 
 
 class DecayTable:
@@ -74,8 +80,8 @@ class DecayTable:
 
     def __init__(self, function: Callable[[Array], Array], longest: float) -> None:
         self._longest = longest
-        pieces = np.ceil(np.log1p(_DECAYED * longest) / _WIDTH)
-        u = _WIDTH * (np.arange(pieces)[:, None] + _NODES)
+        pieces = np.ceil(np.log1p(_DECAYED * longest) / _PIECE_WIDTH)
+        u = _PIECE_WIDTH * (np.arange(pieces)[:, None] + _WIDE_NODES)
         values = function(-np.expm1(u).ravel() / longest).reshape(-1, *u.shape)
         powers = _in_short_pieces(values, _SHORTER).reshape(len(values), -1, len(_ORDERS))
         self._powers = np.ascontiguousarray(np.moveaxis(powers, 2, 0))
@@ -83,7 +89,7 @@ class DecayTable:
 
     def __call__(self, which: IntArray, rates: Array) -> Array:
         """Return sums of some indices, each at rates of its own; both broadcast."""
-        place = np.fmin(np.log(1 - self._longest * rates) / (_WIDTH / _SHORTER), self._end)
+        place = np.fmin(np.log(1 - self._longest * rates) / (_PIECE_WIDTH / _SHORTER), self._end)
         piece = place.astype(np.intp)
         place -= piece
         piece = piece + which * self._powers.shape[2]
@@ -117,7 +123,7 @@ class ModeRows:
         """Return rows of responses with derivatives, (n, 1 + n_parameters, n_rows)."""
         count, parameters, n_modes = modes.rate_slopes.shape
         end_s, deforms, decayed = self._modes.end_s, self._modes.deforms, self._modes.decayed
-        scaled, width = -end_s * modes.rates, _WIDTH / _SHORTER_OF_ROWS
+        scaled, width = -end_s * modes.rates, _PIECE_WIDTH / _SHORTER_OF_ROWS
         u = np.log1p(scaled) / width
         lasts = u < self._last
         piece = np.where(lasts, u, self._last).astype(np.intp)
@@ -165,7 +171,7 @@ class SpanningModes:
         rates, self.decayed, self.powers = _spanning(halvings, orders, deforms)
         self.rates: Array = rates / end_s
         """Rates of the modes, (n_modes,)."""
-        self.scale = _scale(rates, deforms)
+        self.scale = _scale_of_modes(rates, deforms)
         """Factors, (n_modes,), with which responses of modes are as large for all rates."""
 
 
@@ -177,10 +183,10 @@ def _spanning(halvings: int, orders: int, deforms: bool) -> tuple[Array, float, 
     def jumps(rates: Array) -> Array:
         """Return scaled responses to jumps of all orders after all times, (n_jumps, n)."""
         every = respond(range(orders), rates, elapsed[:, None], deforms=deforms)
-        return np.concatenate([found[0] for found in every]) * _scale(rates, deforms)
+        return np.concatenate([found[0] for found in every]) * _scale_of_modes(rates, deforms)
 
-    wide = int(np.ceil(np.log1p(_DECAYED * 2.0**halvings) / _WIDTH))
-    decayed = float(np.expm1(_WIDTH * wide))
+    wide = int(np.ceil(np.log1p(_DECAYED * 2.0**halvings) / _PIECE_WIDTH))
+    decayed = float(np.expm1(_PIECE_WIDTH * wide))
     last = np.log1p(decayed / _SHORT_NODES[0])
     candidates = -np.expm1(np.arange(_SPACING_OF_RATES, last, _SPACING_OF_RATES))
     found = jumps(candidates)
@@ -193,21 +199,21 @@ def _spanning(halvings: int, orders: int, deforms: bool) -> tuple[Array, float, 
     def values(scaled: Array) -> Array:
         """Return shares of modes in tabulated rows, by -T r, (n_modes, n)."""
         shares = np.linalg.solve(triangle, basis.T @ jumps(-scaled))
-        return shares / (_scale(-scaled, deforms) * _divisor(scaled, decayed, deforms))
+        return shares / (_scale_of_modes(-scaled, deforms) * _divisor(scaled, decayed, deforms))
 
     pieces = [
-        _in_short_pieces(values(np.expm1(_WIDTH * (piece + _NODES))), _SHORTER_OF_ROWS)
+        _in_short_pieces(values(np.expm1(_PIECE_WIDTH * (piece + _WIDE_NODES))), _SHORTER_OF_ROWS)
         for piece in range(wide)
     ]
-    beyond = values(decayed / _SHORT_NODES) @ _TO_SERIES @ _TO_POWERS
+    beyond = values(decayed / _SHORT_NODES) @ _TO_CHEBYSHEV @ _TO_POWERS
     return rates, decayed, np.concatenate([*pieces, beyond[:, None]], axis=1)
 
 
 def _independent(columns: Array) -> list[int]:
-    """Return the columns that a pivoted QR takes, up to `_LEFT_OUT`: importing SciPy's is slow."""
+    """Return the columns that a pivoted QR takes: importing SciPy's is slow."""
     left, chosen = columns.copy(), list[int]()
     sizes = np.linalg.norm(left, axis=0)
-    least = _LEFT_OUT * sizes.max()
+    least = _LEAST_LEFT * sizes.max()
     while np.any(sizes > least):
         chosen.append(int(np.argmax(sizes)))
         direction = left[:, chosen[-1]] / sizes[chosen[-1]]
@@ -216,7 +222,7 @@ def _independent(columns: Array) -> list[int]:
     return chosen
 
 
-def _scale(rates: Array, deforms: bool) -> Array:
+def _scale_of_modes(rates: Array, deforms: bool) -> Array:
     """Return factors with which responses of modes are as large for all rates over T."""
     return 1 - rates if deforms else 1 - 1 / rates
 

@@ -1,21 +1,21 @@
 """Residuals of a model against one trace, with exact derivatives by the log-parameters."""
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable
 from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
+import biogrip.levels as levels
 from biogrip.arrays import Array, parts
 from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import Instrument
-from biogrip.physics.modes import compute_modes, linear_responses, sum_of_modes
+from biogrip.physics.modes import compute_modes, linear_responses
 from biogrip.physics.noise import estimate_noise, measure_rounding
 from biogrip.physics.protocol import Course
 from biogrip.physics.sample_model import Network, SampleModel
 from biogrip.physics.simulation import (
-    VISIBLE,
     Grip,
     Ring,
     compute_grip,
@@ -25,13 +25,11 @@ from biogrip.physics.simulation import (
 )
 
 # Most numbers in the rows that are formed at once.
-_NUMBERS_AT_ONCE = 100_000
-# Most responses of modes at readings that a gradient to all digits takes.
-_MOST_NUMBERS = 100_000
+_MISFIT_NUMBERS_AT_ONCE = 100_000
 
 
 @dataclass(frozen=True, eq=False)
-class Trace:
+class CondensedTrace:
     """A trace, and the condensed rows that stand for it."""
 
     readings: Array
@@ -81,7 +79,7 @@ class Residuals:
     """Sample model."""
     course: Course
     """Protocol."""
-    trace: Trace
+    trace: CondensedTrace
     """The trace."""
     _: KW_ONLY
     instrument: Instrument
@@ -152,33 +150,6 @@ class Residuals:
         """Return the simulated response, neither cleared nor whitened, (n_samples,)."""
         return self._simulated(log_parameters)[0]
 
-    def gradients(
-        self, log_parameters: Array, others: Sequence["Residuals"]
-    ) -> tuple[Array, Array]:
-        """Compute gradients of half the sums of squares, and misfits, to all digits.
-
-        Log-parameters are (n, n_parameters); for each there are residuals that share the responses,
-        of the trace to compare with. Gradients are (n, n_parameters), root mean squares (n,).
-
-        Condensed rows have errors of 1e-14 of the response. Of what a trace hardly tells, these
-        move the optimum by 1e-7 and make its last digits those of a processor. So sums run over all
-        readings, unless there are too many of them.
-        """
-        n, parameters = log_parameters.shape
-        sums = np.empty((n, 1 + parameters))
-        for some in parts(n, max(1, _NUMBERS_AT_ONCE // (self.samples * (1 + parameters)))):
-            given = self.gripper, self.model, self.course, np.exp(log_parameters[some])
-            modes, condensed = compute_modes(*given), self.trace.condensed
-            if modes.rates.shape[1] * self.samples <= _MOST_NUMBERS:
-                rows = condensed.cleared(sum_of_modes(modes, self.course, self.trace.time_s))
-                rows[:, 0] -= [other.trace.cleared for other in others[some]]
-            else:
-                rows = condensed.of_modes(modes)
-                rows[:, 0] -= [other.trace.rows for other in others[some]]
-            # One product per sample: the order of its sums does not depend on their number.
-            sums[some] = (rows @ np.ascontiguousarray(rows[:, 0])[:, :, None])[:, :, 0]
-        return sums[:, 1:], np.sqrt(sums[:, 0] / self.samples)
-
     def condensed_responses(self, log_parameters: Array, *, slopes: bool = True) -> Array:
         """Compute rows of responses and, if wanted, their slopes, (n, 1 + n_parameters, n_rows)."""
         given = self.gripper, self.model, self.course
@@ -188,7 +159,7 @@ class Residuals:
     def misfit(self, parameters: Array) -> Array:
         """Compute RMS misfits, (n,), of parameters, (n, n_parameters), each by itself."""
         misfit = np.empty(len(parameters))
-        for some in parts(len(parameters), max(1, _NUMBERS_AT_ONCE // len(self.trace.rows))):
+        for some in parts(len(parameters), max(1, _MISFIT_NUMBERS_AT_ONCE // len(self.trace.rows))):
             responses = self.condensed_responses(np.log(parameters[some]), slopes=False)[:, 0]
             rows = responses - self.trace.rows
             misfit[some] = np.sqrt(np.einsum("nr,nr->n", rows, rows) / self.samples)
@@ -220,7 +191,7 @@ class Residuals:
         shown = self.trace.condensed.cleared(change) / noise_sd
         latest_first = np.argsort(-elapsed, kind="stable")
         norms = np.sqrt(np.cumsum(shown[latest_first] ** 2))
-        visible = np.flatnonzero(norms > VISIBLE)
+        visible = np.flatnonzero(norms > levels.VISIBLE)
         if not len(visible):
             return None
         return Ring(float(np.max(np.abs(shown))), float(elapsed[latest_first[visible[0]]]))

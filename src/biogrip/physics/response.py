@@ -119,7 +119,7 @@ def superpose(
     weights, rates = response.weights[:, arm], response.rates[:, :, None]
     for start, order, height in course.jumps:
         after = time_s >= start
-        growth = _growth(order - rate, rates, time_s[after] - start)
+        growth = _mode_growth(order - rate, rates, time_s[after] - start)
         total[:, after] += np.einsum("nj,njt->nt", height * weights, growth).real
     return total
 
@@ -142,7 +142,7 @@ def linear_jaw_force(
     return force
 
 
-def _growth(order: int, rates: NDArray[Any], elapsed: Array) -> NDArray[Any]:
+def _mode_growth(order: int, rates: NDArray[Any], elapsed: Array) -> NDArray[Any]:
     """Return a mode's response over its weight to t^order/order!; for order -1, to an impulse."""
     z = rates * elapsed
     if order < 0:
@@ -268,7 +268,7 @@ class Arms:
 
 
 # Factor that moves starts off the real axis, which no iteration from a real start would leave.
-_ASIDE = 1 + 1e-3j
+_OFF_REAL_AXIS = 1 + 1e-3j
 # Relative distance to which equal rates of branches are moved apart; the response changes by as
 # much.
 _LEAST_GAP_OF_RATES = 1e-10
@@ -310,7 +310,7 @@ class Ringing:
         branches, ring = self._k.shape[2], spread_starts(self._ring())
         # Starts of the iteration: their origins, and distances beyond them.
         origin = np.concatenate((zeros.pole[:branches].T, np.zeros(ring.shape)), axis=1)
-        beyond = np.concatenate((-zeros.beyond[:branches].T * _ASIDE, ring), axis=1)
+        beyond = np.concatenate((-zeros.beyond[:branches].T * _OFF_REAL_AXIS, ring), axis=1)
         beyond = find_zeros(beyond, lambda points: self._newton_step(origin, points), origin)
         self.rates = s = beyond - origin
         """Roots of E in 1/s, (n, n_modes)."""
@@ -333,7 +333,7 @@ class Ringing:
         """Return weights, (n_arms, n_modes, n), of rotations or the force in N, per N m."""
         left, right = [np.ones_like(self.rates)] * 2
         if not self._alike:
-            left, right = (_value(arm, self.rates) for arm in self._arms)
+            left, right = (_impedance_of_arm(arm, self.rates) for arm in self._arms)
         pressing = [self._lever_m * self._sample * (left + right)] if force else [right, left]
         weights: ComplexArray = np.array(pressing) / (self.rates * self._slope)
         return weights.swapaxes(1, 2)
@@ -374,7 +374,7 @@ class Ringing:
     ) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
         """Return the summand beside b^2 G, and the factor of b^2 G, each with its derivative."""
         (left, left_slope), (right, right_slope) = (
-            (_value(arm, s), 2 * arm.inertia_kgm2 * s + arm.damping_Nms_per_rad)
+            (_impedance_of_arm(arm, s), 2 * arm.inertia_kgm2 * s + arm.damping_Nms_per_rad)
             for arm in self._arms
         )
         if self._alike:
@@ -387,7 +387,7 @@ def _polynomial(arm: Arm) -> Array:
     return np.array([arm.stiffness_Nm_per_rad, arm.damping_Nms_per_rad, arm.inertia_kgm2])
 
 
-def _value(arm: Arm, s: ComplexArray) -> ComplexArray:
+def _impedance_of_arm(arm: Arm, s: ComplexArray) -> ComplexArray:
     """Return the impedance of a free arm."""
     k, c, inertia = _polynomial(arm)
     return k + s * (c + s * inertia)

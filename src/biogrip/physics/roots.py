@@ -38,7 +38,7 @@ apart lose eps/g, and moving them apart changes the response by g^2, both below 
 # Most sweeps over roots that iterations find together, and over zeros of sums of poles.
 _MOST_SWEEPS_OF_ROOTS, _MOST_SWEEPS_OF_ZEROS = 80, 60
 # Share of a sum of poles below which it is zero, and of a distance below which a step is the last.
-_LEAST_SHARE, _SHORTEST_STEP = 4e-16, 1e-9
+_LEAST_SHARE, _LAST_STEP = 4e-16, 1e-9
 
 
 def spread_starts(coefficients: Array) -> ComplexArray:
@@ -211,7 +211,7 @@ def _real_zeros(weights: Array, poles: Array, level: Array) -> Zeros:
         np.copyto(moved, 0.5 * (low + np.minimum(high, 4 * at)), where=outside)
         np.copyto(moved, at, where=converged)
         # Convergence is quadratic, so after a short step the error is below rounding.
-        converged |= np.abs(moved - at) <= _SHORTEST_STEP * moved
+        converged |= np.abs(moved - at) <= _LAST_STEP * moved
         at[:] = found.flat[left] = moved
         left, search = left[~converged], search[:, ~converged]
         if not len(left):

@@ -226,7 +226,7 @@ def _with_known(model: SampleModel, fixed: tuple[tuple[str, float], ...]) -> Sam
 
 
 @cache
-def in_units(model: SampleModel, stiffness: str) -> SampleModel:
+def with_stiffness_unit(model: SampleModel, stiffness: str) -> SampleModel:
     """Return the model with stiffnesses in Pa, as of a sample under stress, or without a unit."""
     parameters = tuple(replace(parameter, stiffness=stiffness) for parameter in model.parameters)
     return replace(model, parameters=parameters)

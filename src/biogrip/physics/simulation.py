@@ -93,10 +93,6 @@ def simulated_response(gripper: Gripper, network: Network, course: Course, time_
 # A ring of exp(-36) is lost in rounding.
 _EFOLDS_OF_RING = 36.0
 
-VISIBLE = 0.2
-"""Norm of a ring in standard deviations of the noise from which it counts as visible: no estimate
-is off by more of its own, and a 95 % interval holds the truth in 94.5 % of traces."""
-
 
 @dataclass(frozen=True)
 class Ring:

@@ -66,7 +66,8 @@ def _of_methods() -> type[Block]:
 
 
 if TYPE_CHECKING:
-    _MethodBlocks = Block
+
+    class _MethodBlocks(Block): ...
 else:
     _MethodBlocks = _of_methods()
 

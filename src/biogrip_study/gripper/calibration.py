@@ -34,8 +34,8 @@ def calibration_yaml(left: CalibratedArm, right: CalibratedArm) -> str:
     """Write the calibrated arms as a config file that can be laid over a study."""
     arms = {"left": left, "right": right}
     block = {
-        **{name: _rounded(arm.arm, 7) for name, arm in arms.items()},
-        "uncertainty": {name: _rounded(arm.uncertainty, 2) for name, arm in arms.items()},
+        **{name: _rounded_arm(arm.arm, 7) for name, arm in arms.items()},
+        "uncertainty": {name: _rounded_arm(arm.uncertainty, 2) for name, arm in arms.items()},
     }
     return yaml.safe_dump({"gripper": block}, sort_keys=False)
 
@@ -63,22 +63,22 @@ def read_calibrated_arms(
         if not text.endswith("\n"):
             raise ValueError("its end is missing")
         block = yaml.safe_load(text)["gripper"]
-        left, right = (_numbers(block[name]) for name in ("left", "right"))
-        uncertainty = {name: _numbers(block["uncertainty"][name]) for name in ("left", "right")}
+        left, right = (_numbers_in(block[name]) for name in ("left", "right"))
+        uncertainty = {name: _numbers_in(block["uncertainty"][name]) for name in ("left", "right")}
     except (OSError, yaml.YAMLError, KeyError, TypeError, ValueError) as error:
         raise BiogripError(f"{path}: cannot be read as a calibration: {error}.") from error
     return replace(gripper, left=Arm(**left), right=Arm(**right)), uncertainty
 
 
-def _numbers(block: dict[str, float]) -> dict[str, float]:
+def _numbers_in(block: dict[str, float]) -> dict[str, float]:
     return {key: float(block[key]) for key in ARM_KEYS}
 
 
-def _rounded(arm: Arm, digits: int) -> dict[str, float]:
+def _rounded_arm(arm: Arm, digits: int) -> dict[str, float]:
     return {key: float(f"{getattr(arm, key):.{digits}g}") for key in ARM_KEYS}
 
 
-_FEWEST_SAMPLES, _MOST_SAMPLES = 64, 10_000_000
+_FEWEST_SAMPLES_OF_RECORD, _MOST_SAMPLES_OF_RECORD = 64, 10_000_000
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ class CalibrationTest(Block):
         if self.rate_Hz < 10 * frequency:
             text = f"found {self.rate_Hz}, allowed is at least ten times the arms' natural"
             yield ("rate_Hz",), f"{text} frequency, {10 * frequency:.4g} Hz."
-        most = _MOST_SAMPLES / self.rate_Hz
+        most = _MOST_SAMPLES_OF_RECORD / self.rate_Hz
         if not 5 / frequency <= self.duration_s <= most:
             text = f"found {self.duration_s}, allowed is from five periods of the arms' ring, "
             yield ("duration_s",), f"{text}{5 / frequency:.3g} s, to {most:.3g} s."
@@ -173,9 +173,11 @@ def calibrate(record: FreeMotion, step_Nm: float, impulse_Nms: float) -> Calibra
 
 def _first_guess(record: FreeMotion, step_Nm: float) -> Array:
     """Estimate stiffness from the step's end, frequency from the spectrum, damping from decay."""
-    if len(record.time_s) < _FEWEST_SAMPLES:
+    if len(record.time_s) < _FEWEST_SAMPLES_OF_RECORD:
         found = f"found {counted(len(record.time_s), 'sample')}"
-        raise BiogripError(f"calibration: {found}, allowed are {_FEWEST_SAMPLES} or more.")
+        raise BiogripError(
+            f"calibration: {found}, allowed are {_FEWEST_SAMPLES_OF_RECORD} or more."
+        )
     tail = len(record.time_s) // 4
     stiffness = step_Nm / np.mean(record.step[-tail:])
     if not stiffness > 0:

@@ -34,7 +34,7 @@ _STAGES = 5
 
 # Length of the first element after a jump of the torque, in s, and the ratio of each element's
 # length to the one before: the error was below 1e-7 of the peak in all tests.
-_FIRST_S, _GROWTH = 1e-8, 1.3
+_FIRST_S, _GROWTH_OF_ELEMENTS = 1e-8, 1.3
 # Largest change in the last sweep, relative to the peak, and limit of sweeps.
 _LARGEST_CHANGE, _MOST_SWEEPS = 1e-13, 200
 
@@ -104,7 +104,7 @@ def correction(
     arms = [gripper.left] if gripper.left == gripper.right else [gripper.left, gripper.right]
     response = step_response(gripper, network, inertia=False)
     edges = _mesh(torque)
-    modes = _Modes(response.rates, weights_of_loads(gripper, network), np.diff(edges))
+    modes = _MeshModes(response.rates, weights_of_loads(gripper, network), np.diff(edges))
     # Collocation nodes, (n_elements, _STAGES).
     nodes = edges[:-1, None] + np.diff(edges)[:, None] * _radau()[0]
     nodes[:, -1] = edges[1:]
@@ -128,7 +128,7 @@ def correction(
     for _ in range(_MOST_SWEEPS):
         u = b_0 * (linear[left] + extra[left])
         u_rate = b_0 * (linear_rate[left] + extra_rate[left])
-        loads[left] = load = b_0 * _load(gripper, arms, tau[left], u, u_rate)
+        loads[left] = load = b_0 * _load_of(gripper, arms, tau[left], u, u_rate)
         # That of both arms, and what that of the left one exceeds that of the right one by.
         load[:, 1:] = load[:, :1] - load[:, 1:]
         found, extra_rate[left] = modes.respond(load, left)
@@ -164,12 +164,12 @@ def _mesh(torque: Course) -> Array:
         while here + 1.5 * length < end:
             here += length
             edges.append(here)
-            length *= _GROWTH
+            length *= _GROWTH_OF_ELEMENTS
         edges.append(end)
     return np.array(edges)
 
 
-def _load(gripper: Gripper, arms: list[Arm], tau: Array, u: Array, u_rate: Array) -> Array:
+def _load_of(gripper: Gripper, arms: list[Arm], tau: Array, u: Array, u_rate: Array) -> Array:
     """Compute the load g of every arm, shape (n, n_arms, n_elements, _STAGES)."""
     b_0 = gripper.lever_m
     phi = rotation_of_tip(gripper, u)
@@ -183,7 +183,7 @@ def _load(gripper: Gripper, arms: list[Arm], tau: Array, u: Array, u_rate: Array
     return load
 
 
-class _Modes:
+class _MeshModes:
     """Computes the response of linear modes to loads given at the nodes of a mesh."""
 
     def __init__(self, rates: Array, weights: Array, lengths_s: Array) -> None:

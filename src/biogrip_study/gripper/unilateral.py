@@ -28,11 +28,11 @@ from biogrip.physics.sample_model import Network
 
 _MOST_EVENTS = 100_000
 # Share of the largest force and closing below which a change of contact is rounding.
-_LEAST_SHARE = 1e-11
+_LEAST_CHANGE = 1e-11
 # Time within which a sample without a parallel damper yields, for what is seen at once.
 _AT_ONCE_S = 1e-10
 # Growth of the distances in the grid on which the end of a stretch is bracketed.
-_GROWTH = 1.1
+_GROWTH_OF_TIMES = 1.1
 
 
 @dataclass(frozen=True)
@@ -60,61 +60,92 @@ def unilateral_response(
 ) -> UnilateralResponse:
     """Simulate the first sample in unilateral contact with the jaws, without inertia.
 
-    Times ascend; at the instant of a step: what follows it. If contact is lost too often, it is a
-    `BiogripError`.
+    Phase after phase: solve from the state reached on; find when the margin falls below zero; read
+    the solution up to there; go on from there, with or without contact.
+
+    Parameters
+    ----------
+    gripper, network, torque
+        Arms, samples of which the first counts, and protocol of both arms.
+    time_s
+        Ascending, (n_times,); at the instant of a step: what follows it.
+
+    Raises
+    ------
+    BiogripError
+        If contact is lost too often.
     """
-    system, lengths = _System(gripper, network), np.diff(torque.time_s, append=torque.end_s)
-    # Start and length of each phase, and the torques of both arms in it.
-    both = [np.stack((powers, powers)) for powers in torque.within_phases]
-    pieces = list(zip(torque.time_s.tolist(), lengths.tolist(), both, strict=True))
-    most_torque = max(
-        float(np.max(np.abs(_loads(torques, np.array([0.0, length])))))
-        for _, length, torques in pieces
-    )
+    system, readings = _System(gripper, network), _Readings(time_s, 3 + network.k.shape[1])
+    least = _least_changes(gripper, torque)
+    touching, state = True, np.zeros(3 + network.k.shape[1])
+    changes_s: dict[bool, list[float]] = {True: [], False: []}
+    lengths_s = np.diff(torque.time_s, append=torque.end_s).tolist()
+    phases = zip(torque.time_s.tolist(), lengths_s, torque.within_phases, strict=True)
+    for start_s, length_s, powers in phases:
+        begin_s, in_phase = 0.0, True
+        while in_phase:
+            solve = system.in_contact if touching else system.apart
+            stretch = solve(state, _torques_after(powers, begin_s))
+            grid_s = _growing_times(stretch.fastest_per_s, length_s - begin_s)
+            lasts_s = _first_below(stretch.margin, grid_s, least[touching])
+            end_s = length_s if lasts_s is None else begin_s + lasts_s
+            readings.take(stretch, start_s + begin_s, start_s + end_s, touching=touching)
+            over_s = length_s - begin_s if lasts_s is None else lasts_s
+            state = stretch.state(np.array([over_s]))[:, 0]
+            in_phase = lasts_s is not None
+            if in_phase:
+                begin_s = end_s
+                changes_s[touching].append(start_s + begin_s)
+                touching = not touching
+                _check_events(len(changes_s[True]))
+    states, both_s = readings.states, (tuple(changes_s[True]), tuple(changes_s[False]))
+    of_sample = states[2], states[3:]
+    return UnilateralResponse(states[:2], readings.force_N, readings.touching, *of_sample, *both_s)
+
+
+class _Readings:
+    """What is read at times, (n_times,), stretch by stretch."""
+
+    def __init__(self, time_s: Array, n_states: int) -> None:
+        self._time_s = time_s
+        self.states = np.zeros((n_states, len(time_s)))
+        self.force_N, self.touching = np.zeros(len(time_s)), np.zeros(len(time_s), dtype=bool)
+
+    def take(self, stretch: "_Stretch", begin_s: float, end_s: float, *, touching: bool) -> None:
+        """Read a stretch; a reading at its end is also the first of the next, which replaces it."""
+        here = (self._time_s >= begin_s) & (self._time_s <= end_s)
+        elapsed_s = self._time_s[here] - begin_s
+        if not len(elapsed_s):
+            return
+        self.states[:, here] = stretch.state(elapsed_s)
+        self.touching[here] = touching
+        if touching:
+            self.force_N[here] = np.maximum(stretch.margin(elapsed_s), 0.0)
+
+
+def _least_changes(gripper: Gripper, torque: Course) -> dict[bool, float]:
+    """Return the force in N, in contact, and the gap in m, apart, below which is rounding."""
+    lengths_s = np.diff(torque.time_s, append=torque.end_s)
+    phases = zip(lengths_s, torque.within_phases, strict=True)
+    ends = [_loads(powers, np.array([0.0, length_s])) for length_s, powers in phases]
+    largest = float(np.max(np.abs(ends)))
     softest = min(arm.stiffness_Nm_per_rad for arm in (gripper.left, gripper.right))
-    least = {
-        True: _LEAST_SHARE * most_torque / gripper.lever_m,
-        False: _LEAST_SHARE * 2 * gripper.lever_m * most_torque / softest,
-    }
-    branches = network.k.shape[1]
-    states = np.zeros((3 + branches, len(time_s)))
-    force, touches = np.zeros(len(time_s)), np.zeros(len(time_s), dtype=bool)
-    touching, state = True, np.zeros(3 + branches)
-    parted: list[float] = []
-    met: list[float] = []
-    for start, length, torques in pieces:
-        done = 0.0
-        while True:
-            go_on = system.in_contact if touching else system.apart
-            # The torques, counted from there on.
-            shift = np.array([[1, 0, 0], [done, 1, 0], [done**2 / 2, done, 1]])
-            stretch = go_on(state, torques @ shift)
-            grid = _grid(stretch.fastest_per_s, length - done)
-            lasts = _first_below(stretch.margin, grid, least[touching])
-            begin, end = start + done, start + (length if lasts is None else done + lasts)
-            # A reading at its end is also the first of the next stretch, which takes its place.
-            here = (time_s >= begin) & (time_s <= end)
-            elapsed = time_s[here] - begin
-            if len(elapsed):
-                states[:, here] = stretch.state(elapsed)
-                touches[here] = touching
-                if touching:
-                    force[here] = np.maximum(stretch.margin(elapsed), 0.0)
-            over = np.array([length - done if lasts is None else lasts])
-            state = stretch.state(over)[:, 0]
-            if lasts is None:
-                break
-            done += lasts
-            (parted if touching else met).append(start + done)
-            touching = not touching
-            if len(parted) > _MOST_EVENTS:
-                raise BiogripError(
-                    f"the jaws leave the sample more than {_MOST_EVENTS} times; allowed are "
-                    "protocols with fewer phases."
-                )
-    return UnilateralResponse(
-        states[:2], force, touches, states[2], states[3:], tuple(parted), tuple(met)
-    )
+    force, gap = largest / gripper.lever_m, 2 * gripper.lever_m * largest / softest
+    return {True: _LEAST_CHANGE * force, False: _LEAST_CHANGE * gap}
+
+
+def _torques_after(powers: Array, elapsed_s: float) -> Array:
+    """Return both arms' torque, (2, 3) as in `_loads`, counted from a time within a phase."""
+    shift = np.array([[1, 0, 0], [elapsed_s, 1, 0], [elapsed_s**2 / 2, elapsed_s, 1]])
+    return np.stack((powers, powers)) @ shift
+
+
+def _check_events(count: int) -> None:
+    if count > _MOST_EVENTS:
+        raise BiogripError(
+            f"the jaws leave the sample more than {_MOST_EVENTS} times; allowed are protocols with "
+            "fewer phases."
+        )
 
 
 def _loads(powers: Array, elapsed_s: Array) -> Array:
@@ -122,7 +153,7 @@ def _loads(powers: Array, elapsed_s: Array) -> Array:
     return powers @ np.stack((np.ones_like(elapsed_s), elapsed_s, elapsed_s**2 / 2))
 
 
-class _Modes:
+class _StretchModes:
     """Modes of springs G, (n_springs, n_states), and dampers L, (n_states, n_states), lower."""
 
     def __init__(self, springs: Array, dampers: Array) -> None:
@@ -180,16 +211,18 @@ class _System:
         spring_rows = np.hstack((np.diag(np.sqrt(self._k)), np.zeros((2, n))))
         branches = np.sqrt(k)[:, None] * np.hstack((np.tile(tips, (n, 1)), -np.eye(n)))
         side = np.sqrt(k_p) * np.concatenate((tips, np.zeros(n)))
-        self._touching = _Modes(
+        self._touching = _StretchModes(
             np.vstack((spring_rows, side, branches)),
             _coupled(self._c, b * b * c_p, np.sqrt(c)),
         )
-        self._arms = _Modes(np.diag(np.sqrt(self._k)), np.diag(np.sqrt(self._c)))
+        self._arms = _StretchModes(np.diag(np.sqrt(self._k)), np.diag(np.sqrt(self._c)))
         # Springs of a sample without a parallel damper are in equilibrium but for so long.
         c_p = c_p or _AT_ONCE_S * (k_p + k.sum())
-        own = np.concatenate(([np.sqrt(k_p)], np.zeros(n)))
-        rest = np.sqrt(k)[:, None] * np.hstack((np.ones((n, 1)), -np.eye(n)))
-        self._sample = _Modes(np.vstack((own, rest)), np.diag(np.sqrt(np.append(c_p, c))))
+        parallel = np.concatenate(([np.sqrt(k_p)], np.zeros(n)))
+        in_series = np.sqrt(k)[:, None] * np.hstack((np.ones((n, 1)), -np.eye(n)))
+        self._sample = _StretchModes(
+            np.vstack((parallel, in_series)), np.diag(np.sqrt(np.append(c_p, c)))
+        )
 
     def in_contact(self, state: Array, torques: Array) -> _Stretch:
         """Solve from a state on, in contact."""
@@ -231,11 +264,11 @@ def _coupled(arms: Array, shared: float, diagonal: Array) -> Array:
     return whole
 
 
-def _grid(fastest_per_s: float, length_s: float) -> Array:
+def _growing_times(fastest_per_s: float, length_s: float) -> Array:
     """Return times from 0 to the end, at growing distances, (n_times,)."""
     first = min(1e-2 / fastest_per_s, length_s)
-    count = int(np.ceil(np.log(length_s / first) / np.log(_GROWTH))) + 1
-    growing = first * _GROWTH ** np.arange(count)
+    count = int(np.ceil(np.log(length_s / first) / np.log(_GROWTH_OF_TIMES))) + 1
+    growing = first * _GROWTH_OF_TIMES ** np.arange(count)
     return np.concatenate(([0.0], growing[growing < length_s], [length_s]), dtype=float)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import Field
 
 from biogrip.arrays import Array
-from biogrip.fit.problem import Fit, History, Progress, Row, TraceProblem, silent
+from biogrip.fit.problem import Fit, History, HistoryRow, ReportProgress, TraceProblem, silent
 from biogrip.keys import Block
 from biogrip_study.methods.misfit import make_misfit
 
@@ -34,7 +34,7 @@ def identify_many(
     problems: Sequence[TraceProblem],
     settings: DifferentialEvolutionSettings,
     rngs: Sequence[np.random.Generator],
-    progress: Progress = silent,
+    progress: ReportProgress = silent,
 ) -> list[Fit]:
     """Identify samples one after the other by SciPy's differential evolution.
 
@@ -49,11 +49,11 @@ def _identified(
     problem: TraceProblem,
     settings: DifferentialEvolutionSettings,
     rng: np.random.Generator,
-    progress: Progress,
+    progress: ReportProgress,
 ) -> Fit:
     from scipy.optimize import Bounds, differential_evolution
 
-    rows: list[Row] = []
+    rows: list[HistoryRow] = []
     misfit = make_misfit(problem.residuals)
     evaluations = 0
 
@@ -62,7 +62,7 @@ def _identified(
         evaluations += columns.shape[1]
         return misfit(np.exp(columns.T)).astype(np.float32).astype(float)
 
-    def row_of(result: Any) -> Row:
+    def row_of(result: Any) -> HistoryRow:
         median = float(np.median(result.population_energies))
         return np.exp(result.x), float(result.fun), median, evaluations
 

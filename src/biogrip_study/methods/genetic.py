@@ -21,7 +21,7 @@ from pydantic import Field
 
 from biogrip.arrays import Array, IntArray
 from biogrip.digits import counted
-from biogrip.fit.problem import Fit, History, Progress, Row, TraceProblem, silent
+from biogrip.fit.problem import Fit, History, HistoryRow, ReportProgress, TraceProblem, silent
 from biogrip.keys import Block, Complaint
 from biogrip_study.methods.genome import Chromosomes, Genome, make_genome
 from biogrip_study.methods.misfit import make_misfits
@@ -84,7 +84,7 @@ def identify_many(
     problems: Sequence[TraceProblem],
     settings: GeneticSettings,
     rngs: Sequence[np.random.Generator],
-    progress: Progress = silent,
+    progress: ReportProgress = silent,
 ) -> list[Fit]:
     """Identify samples of one model by the paper's genetic algorithm, all at once."""
     return [found for found, _, _ in evolve(problems, settings, rngs, progress)]
@@ -94,7 +94,7 @@ def evolve(
     problems: Sequence[TraceProblem],
     settings: GeneticSettings,
     rngs: Sequence[np.random.Generator],
-    progress: Progress = silent,
+    progress: ReportProgress = silent,
 ) -> list[tuple[Fit, Array, Array]]:
     """Identify samples as `identify_many` does; return the first and last survivors as well.
 
@@ -122,7 +122,7 @@ def evolve(
     survivors, ranking = select(everyone, ranked(everyone, running), genome, settings.survivors)
     first, last = survivors, survivors.copy()
     improved, stalled = np.zeros_like(running), np.zeros(len(rngs), dtype=bool)
-    courses: list[list[Row]] = [[] for _ in rngs]
+    courses: list[list[HistoryRow]] = [[] for _ in rngs]
     evaluations = settings.population
     evaluations_of_all = evaluations * len(rngs)
     record()

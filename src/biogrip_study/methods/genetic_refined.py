@@ -13,7 +13,7 @@ from pydantic import Field
 
 from biogrip.arrays import Array
 from biogrip.fit.least_squares import best_of_starts
-from biogrip.fit.problem import Fit, History, Progress, Row, TraceProblem, silent
+from biogrip.fit.problem import Fit, History, HistoryRow, ReportProgress, TraceProblem, silent
 from biogrip.keys import Block
 from biogrip_study.methods.genetic import GeneticSettings, evolve
 
@@ -32,13 +32,13 @@ def identify_many(
     problems: Sequence[TraceProblem],
     settings: tuple[GeneticSettings, Polishing],
     rngs: Sequence[np.random.Generator],
-    progress: Progress = silent,
+    progress: ReportProgress = silent,
 ) -> list[Fit]:
     """Identify samples of one model by the genetic algorithm and local fits from its survivors."""
     genetic, polishing = settings
     evolutions = evolve(problems, genetic, rngs, progress)
     starts: list[Array] = []
-    before: list[Row] = []
+    before: list[HistoryRow] = []
     for coarse, first, last in evolutions:
         starts.append(np.log(np.concatenate((last[: polishing.last], first[: polishing.first]))))
         median = float(coarse.history.median_misfit[-1])

@@ -137,7 +137,7 @@ class SeriesMisfit:
         square = self._model_square_sums(static, rates, weights)
         square += self._square_sums.take(trace)
         product = static * self._projections_of_constant.take(trace)
-        product += _sum(weights * self.projections(trace, rates))
+        product += _sum_in_order(weights * self.projections(trace, rates))
         product *= 2
         square -= product
         np.maximum(square, 0, out=square)
@@ -169,7 +169,7 @@ class SeriesMisfit:
         terms *= amplitudes
         constants *= constants
         constants *= self._lengths[1:]
-        return _sum(_sum(terms)) + _sum(constants)[0]
+        return _sum_in_order(_sum_in_order(terms)) + _sum_in_order(constants)[0]
 
     def _amplitudes(self, weights: Array, decays: Array) -> Array:
         """Compute amplitudes of modes at the start of each phase, (n_phases, n_modes, n)."""
@@ -183,7 +183,7 @@ class SeriesMisfit:
         sums = _power_sums(self._traces, self._first_samples, rates)
         decays = np.exp(self._lengths[1:] * rates)
         amplitudes = self._amplitudes(np.ones((1, len(rates))), decays)
-        return _sum(amplitudes * sums.swapaxes(0, 1))
+        return _sum_in_order(amplitudes * sums.swapaxes(0, 1))
 
 
 def two_modes(arm: Arm, lever_m: float, network: Network) -> tuple[Array, Array, Array]:
@@ -205,7 +205,7 @@ def two_modes(arm: Arm, lever_m: float, network: Network) -> tuple[Array, Array,
     return 0.5 / spring, -x, -0.5 / (spring + branch * share * share)
 
 
-def _sum(terms: Array) -> Array:
+def _sum_in_order(terms: Array) -> Array:
     """Sum over the first axis in order, whatever the shape."""
     total: Array = terms[0]
     for term in terms[1:]:

@@ -15,7 +15,7 @@ from importlib import import_module
 import numpy as np
 
 from biogrip.fit.least_squares import LeastSquaresSettings
-from biogrip.fit.problem import Fit, Progress, TraceProblem
+from biogrip.fit.problem import Fit, ReportProgress, TraceProblem
 from biogrip.keys import Block
 from biogrip_study.methods.differential_evolution import DifferentialEvolutionSettings
 from biogrip_study.methods.genetic import GeneticSettings
@@ -90,7 +90,9 @@ SETTINGS: dict[str, type[Block]] = {
 }
 """Classes of the config blocks of all methods, by their keys."""
 
-Identify = Callable[[Sequence[TraceProblem], Sequence[np.random.Generator], Progress], list[Fit]]
+Identify = Callable[
+    [Sequence[TraceProblem], Sequence[np.random.Generator], ReportProgress], list[Fit]
+]
 """Identifies traces as the ``identify_many`` of a method does, with its settings."""
 
 
@@ -99,7 +101,9 @@ def identifier(name: str, settings: object) -> Identify:
     module = import_module(f"{METHODS[name].package}.{name}")
 
     def identify(
-        problems: Sequence[TraceProblem], rngs: Sequence[np.random.Generator], progress: Progress
+        problems: Sequence[TraceProblem],
+        rngs: Sequence[np.random.Generator],
+        progress: ReportProgress,
     ) -> list[Fit]:
         fits = module.identify_many(problems, settings, rngs, progress)
         pairs = zip(problems, fits, strict=True)

@@ -8,10 +8,10 @@ import pandas as pd
 from scipy.special import betaincinv
 
 from biogrip.fit.nested_fits import aic_and_bic
-from biogrip.judging.levels import WIDE
-from biogrip.judging.likelihood import bound
+from biogrip.judging.likelihood import least_sd
 from biogrip.judging.quantities import Quantity, parameters_and_sum, quantity_value
 from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
+from biogrip.levels import WIDE
 from biogrip.physics.noise import standard_deviation
 from biogrip_study.config.study import Case, Study
 from biogrip_study.gripper.calibration import with_calibration
@@ -193,7 +193,7 @@ def bounds_at_truth(
     _, sensitivity = experiment.of(time_s, rotation).residuals(log_truth)
     noise_sd = standard_deviation(rotation, case.noise)
     quantities = parameters_and_sum(experiment.searched)
-    return [(each, bound(sensitivity, noise_sd, log_truth, each)) for each in quantities]
+    return [(each, least_sd(sensitivity, noise_sd, log_truth, each)) for each in quantities]
 
 
 def read_intervals(study: Study, path: Path) -> pd.DataFrame:
@@ -221,7 +221,7 @@ def _judged_seeds(study: Study) -> str:
     return "every seed" if 1 in every else f"one of {every.pop()} seeds"
 
 
-def _spreads(found: pd.DataFrame, truth: float, bound: float, confidence: float) -> Row:
+def _spreads(found: pd.DataFrame, truth: float, least_sd: float, confidence: float) -> Row:
     """Return bound, spread and coverage of a quantity; nothing of one without intervals."""
     if found.empty:
         return {}
@@ -230,10 +230,10 @@ def _spreads(found: pd.DataFrame, truth: float, bound: float, confidence: float)
         for name in ("estimate", "estimate_rest_known")
     )
     return {
-        "bound_percent": bound,
+        "bound_percent": least_sd,
         "spread_percent": spread,
-        "spread_over_bound": spread / bound,
-        "rest_known_over_bound": rest_known / bound,
+        "spread_over_bound": spread / least_sd,
+        "rest_known_over_bound": rest_known / least_sd,
         "bias_percent": np.mean(100 * np.log(found["estimate"].to_numpy(float) / truth)),
         "confidence_percent": 100 * confidence,
         "coverage_percent": 100 * np.mean(_holds(found, truth)),

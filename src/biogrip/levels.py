@@ -1,4 +1,4 @@
-"""Every level and threshold that decides a status, or whether a limit is said, with its reason.
+"""Every level and threshold that decides what a user is told of a trace, with its reason.
 
 Levels of significance say how often a right fit is blamed by chance; `docs/levels.md` has how often
 all tests together do. What has no such reason is chosen, and said to be. Tolerances of numerical
@@ -13,6 +13,10 @@ are."""
 
 CERTAIN_MISFIT = 0.001
 """Level of the test that tells misfit from noise, stricter as it may reject a fit."""
+
+OUTLYING = 4.5
+"""Distance of an outlier from the median of the residuals around, in standard deviations of the
+noise: one Gaussian reading in 150,000 is further away."""
 
 TOO_MUCH = 1.2
 """Misfit over the scatter of neighbouring readings from which on it changes limits. Chosen: by less
@@ -50,6 +54,10 @@ SURE = 2.0
 SMOOTH = 3.0
 """Scatter over that of noise which is correlated for `SLOW` from which on it is no such noise.
 Chosen."""
+
+IN_ONE_STRETCH = 0.3
+"""Share of the sum of squares that none of 20 stretches has of stationary noise which is correlated
+for less than half a stretch: what has it is no such noise."""
 
 UNEVEN = 3.0
 """Ratio of the scatter of stretches, which white noise exceeds in 20 of them once in hundreds."""
@@ -89,6 +97,10 @@ CONSTANT, CONSTANT_OF_PEAK, FEWEST_BEFORE = 2.0, 1e-3, 3
 """Standard deviation of constant readings, in noise and in peaks of noise-free traces, and fewest
 of which it is known. Chosen."""
 
+OF_WHAT_A_START_GAINS = 0.5
+"""Share of the fall of chi^2 that a late start needs which any linear sample has to reach from
+where the start was guessed, before it is fitted: moving it a little gains the rest. Chosen."""
+
 OFFSET = 40.0
 """Fall of chi^2 by which an offset is better than a late start: by chance once in a billion."""
 
@@ -124,6 +136,9 @@ WIDE = 3.0
 """Limits further than this factor from their middle tell little more than an order of magnitude:
 moduli of cells of one kind scatter by a factor of about 2 to 3."""
 
+GAP = 1.01
+"""Factor by which a profile exceeds the threshold in a gap: fits give chi^2 to about 0.01."""
+
 WORTH_A_PROFILE = 0.5
 """First-order standard deviation of the logarithm of a combination of undetermined parameters below
 which it may be determined: its limits are then within a factor of e or so."""
@@ -135,10 +150,36 @@ BEYOND_THE_RANGE = 9.0
 """Decrease of chi^2 beyond an end of the search range that is more than chance: three standard
 deviations squared."""
 
+LITTLE = 0.01
+"""Share of a value, without a model, below which a lower limit says no more than that it is
+positive. Chosen."""
+
+HANGS = 10.0
+"""A limit without a model hangs on what hardly shows, and is not said, if a noise of that changes
+the quantity so many times more than what shows does. Chosen."""
+
+OF_THE_FASTEST = 1e4
+"""Ratio beyond which an upper limit hangs on the fastest lag that is tried, and is not said."""
+
+WORTH_SAYING = 0.005
+"""Share of the noise's variance that is said: half of the percent that it is rounded to."""
+
 # Other models, and instruments.
+
+WORTH_A_MENTION, STRONG = 2.0, 6.0
+"""Differences of BIC from which on a simpler model is preferred, and any other (Kass and Raftery
+1995)."""
 
 FAR_BETTER = 10.0
 """Difference of BIC by which a model is far better than another (Kass and Raftery 1995)."""
+
+VISIBLE = 0.2
+"""Norm of a ring in standard deviations of the noise from which it counts as visible: no estimate
+is off by more of its own, and a 95 % interval holds the truth in 94.5 % of traces."""
+
+SMOOTHED = 1.0
+"""Fall of chi^2 by which a recorded load fits better without its sensor's noise: by less than a
+tenth it falls where nothing is smoothed out, and if it hardly falls, both courses will do."""
 
 SATURATED, MORE_OFTEN, FEWEST_VALUES = 0.05, 5, 5
 """Share of readings at an end of their scale from which on they are saturated, how many times as
@@ -150,6 +191,9 @@ SMALLEST_SHARE, LARGEST_SHARE = 2e-3, 1.5
 """Plausible rotations over that of the free arm, which no sample exceeds but for errors of fit and
 stiffness; the paper's stiffest sample turns it by 8e-3. The ratio is below 1000, so that no
 trace passes both in its unit and in one a thousand times larger or smaller."""
+
+NO_READING = 100.0
+"""Distance from the median, over that of all but a tenth, of what is no reading. Chosen."""
 
 SHORTEST_SHARE = 0.02
 """Share of the protocol that a trace must cover: more than min/h = s/min = 1/60."""
