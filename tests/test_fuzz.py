@@ -217,4 +217,4 @@ def test_a_damaged_result_is_refused(tmp_path: Path, few: Path) -> None:
             changed = read_result(result, made_from)
         assert changed in (None, whole), seed
         with suppress(BiogripError):
-            check_outputs({"a.csv": result}, [])
+            check_outputs([("a.csv", result)], [])

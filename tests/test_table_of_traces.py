@@ -67,7 +67,8 @@ def refused(path: Path) -> list[str]:
 
 
 def test_a_trace_may_stand_beside_a_table_that_does_not_name_it(here: Path) -> None:
-    assert "the same file to be written twice" in identify("cells.tsv", "other.csv")[2]
+    said = "other.identified.json: would be written for 'other.csv' and for 'other.csv'"
+    assert said in identify("cells.tsv", "other.csv")[2]
     write(here / "cells.tsv", HEADER, OTHER)
     status, printed, _ = identify("usual.csv", "cells.tsv", "--csv", "found.csv")
     assert status == 0

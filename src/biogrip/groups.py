@@ -97,7 +97,7 @@ def groups(
         if all(own[name] for name in made_by) and _is_used(own):
             used.append(own)
             told.append(_told(own, copied | {*made_by}, units, where))
-    check_outputs({"--csv": table, "--plot": plot}, [found])
+    check_outputs([("--csv", table), ("--plot", plot)], [found])
     if plot is not None and plot.suffix not in (".png", ".pdf"):
         text = f"found {visible(plot)}; allowed is a name that ends with .png or .pdf."
         raise BiogripError(f"--plot: {text}")

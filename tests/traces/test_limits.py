@@ -75,7 +75,7 @@ def test_cells_that_the_last_row_lacks_are_told(tmp_path: Path) -> None:
     rows = HEADER.replace("\n", ",x\n") + ROWS.replace("\n", ",5\n")
     assert read(tmp_path / "a.csv", rows).remarks() == []
     (said,) = read(tmp_path / "a.csv", rows + "20,2e-6\n").remarks()
-    assert said == "The last row has fewer cells than the row before: the trace may be cut there."
+    assert said == "The last row has fewer cells than the row before, as where a file was cut."
 
 
 # Reads files of hostile shape, and prints the most memory that it took, in kB.

@@ -99,7 +99,7 @@ def identify_files(
     check_settings(every)
     outputs = [output or own.output for own in every] if rows is None else []
     names = [own.name for own in every]
-    written = {**dict(zip(names, outputs, strict=False)), "--report": report, "--csv": table}
+    written = [*zip(names, outputs, strict=False), ("--report", report), ("--csv", table)]
     check_outputs(written, [*files, *(own.trace for own in every), *filter(None, [config])])
     drawn = report is not None and len(every) <= MOST_DRAWN
     outcome = _identify_traces(every, outputs or None, drawn=drawn)
@@ -261,7 +261,7 @@ def identify_batch(
                     told.note(form_in_words(trace.trace, recording.form))
                 read[index] = case, prepare(recording, case.judged_experiment)
         results: dict[int, dict[str, Any]] = {}
-        for index, diagnosis in _judged(asked, read, refused, told):
+        for index, diagnosis in _diagnosed(asked, read, refused, told):
             trace = asked[index]
             with _caught(trace, refused):
                 results[index] = data_of(diagnosis, read[index][0], trace.name, trace.given)
@@ -280,7 +280,7 @@ def identify_batch(
     return outcome
 
 
-def _judged(
+def _diagnosed(
     asked: Sequence[Asked],
     read: Mapping[int, tuple[SampleCase, Trace]],
     refused: dict[str, str],

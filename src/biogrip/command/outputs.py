@@ -60,21 +60,24 @@ class Outcome:
     """Cells to copy from a table of traces by file, of all in the order of its rows, and column."""
 
 
-def check_outputs(outputs: Mapping[str, Path | None], inputs: Iterable[Path]) -> None:
+def check_outputs(outputs: Iterable[tuple[str, Path | None]], inputs: Iterable[Path]) -> None:
     """Refuse, by a `BiogripError`, files that are read, or written twice, or not to be replaced.
 
-    `outputs` are those that are asked for, each by its trace or its option.
+    `outputs` are those that are asked for, each behind its trace or its option.
     """
     # Path.exists raises for invalid paths; os.path.exists returns False.
     read = {os.path.realpath(path) for path in inputs if os.path.exists(path)}
     first: dict[str, str] = {}
-    for written_for, output in outputs.items():
+    for written_for, output in outputs:
         if output is None:
             continue
         place = os.path.join(os.path.realpath(output.parent), output.name)
-        if (other := first.setdefault(place, written_for)) != written_for:
-            text = f"would be written for '{visible(other)}' and for '{visible(written_for)}'"
+        if place in first:
+            text = (
+                f"would be written for '{visible(first[place])}' and for '{visible(written_for)}'"
+            )
             raise BiogripError(f"{visible(output)}: {text}; allowed is a file for each.")
+        first[place] = written_for
         if os.path.realpath(output) in read:
             raise BiogripError(f"{visible(output)}: is read; allowed is another file to write.")
         _check_output(output, written_for)
@@ -99,10 +102,12 @@ def _check_output(output: Path, written_for: str) -> None:
     if not output.is_symlink():
         with output.open("rb") as stream:
             head = stream.read(_HEAD_BYTES)
+    of_trace = _OF_TRACE.search(head)
+    trace = json.loads(of_trace[1]) if of_trace else written_for
     if WRITTEN_BY.encode() not in head:
         problem = "is there, and biogrip did not write it"
-    elif (result := _OF_TRACE.search(head)) and not _same(json.loads(result[1]), written_for):
-        problem = f"is the result of '{visible(json.loads(result[1]))}', and would be replaced for "
+    elif not _are_of_one_trace(trace, written_for):
+        problem = f"is the result of '{visible(trace)}', and would be replaced for "
         problem += f"'{visible(written_for)}'"
     else:
         return
@@ -110,7 +115,7 @@ def _check_output(output: Path, written_for: str) -> None:
     raise BiogripError(f"{visible(output)}: {text}")
 
 
-def _same(one: str, other: str) -> bool:
+def _are_of_one_trace(one: str, other: str) -> bool:
     """Return True if two names are of one trace; the folder may be said from another one."""
     if os.path.exists(one) and os.path.exists(other):
         return os.path.samefile(one, other)

@@ -139,7 +139,7 @@ class Recording:
         if "below" in form:
             said.append(f"Left out below the last row, where it may be cut: {form['below']}.")
         if "lacks" in form:
-            said.append(f"The last row has {form['lacks']}: the trace may be cut there.")
+            said.append(f"The last row has {form['lacks']}, as where a file was cut.")
         if "clock" in form:
             begins = ", when the protocol is taken to start" * form["clock"].startswith("dates")
             said.append(f"Times are {form['clock']}{begins * (self.onset_s is None)}.")
