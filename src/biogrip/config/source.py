@@ -112,8 +112,7 @@ def _refuse_deep(text: str, loader: Any) -> None:
         depth += isinstance(event, yaml.CollectionStartEvent)
         depth -= isinstance(event, yaml.CollectionEndEvent)
         if depth > _DEEPEST:
-            line = event.start_mark.line + 1
-            raise ValueError(f"found more than {_DEEPEST} levels in line {line}, allowed are fewer")
+            raise ValueError(f"found more than {_DEEPEST} levels, allowed are fewer")
 
 
 def value_of(text: str, key: str = "") -> Any:
