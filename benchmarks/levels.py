@@ -42,6 +42,7 @@ _UNKNOWN = "late clock"
 # Steps of a recorded course between two rows.
 _FINE = 200
 RIGHT, WRONG, LOAD, SWEEP, _TAKEN = "right", "wrong", "recorded load", "sweep", " taken for "
+ADDS = "instrument"
 
 ALARMS = {
     "neighbours are correlated": "Neighbouring residuals",
@@ -157,6 +158,11 @@ def _best(response: Any, truth: Values, time_s: Array, in_noise: Array, sd: floa
     return float(ncf.sf(f.isf(_LEVEL, 1, free), 1, free, max(float(rest @ rest), 1e-9)))
 
 
+def _zero(time_s: Array, of: Course, _rng: Rng, _sd: float) -> Array:
+    clean: Array = of(time_s)
+    return clean + 0.05 * np.max(clean)
+
+
 def _late(time_s: Array, of: Course, _rng: Rng, _sd: float) -> Array:
     return of(time_s - 0.02 * time_s[-1])
 
@@ -176,6 +182,7 @@ CHANGES: dict[str, Change] = {
     "start 2 % of the trace late": _late,
     "ramp of 10 % taken for a step": _ramp,
     "first two readings 5 noises high": lambda t, of, _, sd: of(t) + 5 * sd * (t <= t[1]),
+    "zero 5 % of the peak off": _zero,
     "drift of 3 noises": lambda t, of, _, sd: of(t) + 3 * sd * t / t[-1],
     "two branches, ten times apart": _two_branches,
 }
@@ -215,6 +222,18 @@ def _late_clock(rng: Rng) -> tuple[Array, Course]:
     return np.linspace(first_s, first_s + 10, 201), lambda t: np.ones_like(t)
 
 
+def _held_later(rng: Rng) -> tuple[Array, Course]:
+    """Return a hold that comes between two rows, after 2 s, and lasts for 20 to 60 s."""
+    at_s = 2.0 + float(rng.uniform(0.0, 0.2))
+    return _rows(rng, float(rng.uniform(20.0, 60.0)), 0.2), lambda t: np.where(t >= at_s, 1.0, 0.0)
+
+
+def _mid_phase(rng: Rng) -> tuple[Array, Course]:
+    """Return a sine of 2 s that is recorded from any phase on."""
+    phase, rows = rng.uniform(0, 2 * np.pi), int(rng.integers(25, 101))
+    return np.arange(300) * 2 / rows, lambda t: np.sin(np.pi * t + phase)
+
+
 def creeps(rng: Rng, course: Callable[[Rng], tuple[Array, Course]], sensor: float = 0.0) -> Trace:
     """Return the strain of a Zener solid under a course that is recorded with it."""
     from scipy.signal import lfilter
@@ -229,6 +248,66 @@ def creeps(rng: Rng, course: Callable[[Rng], tuple[Array, Course]], sensor: floa
     yielded = lfilter(taken, [1.0, -left], load(fine_s), zi=[-taken[0] * load(fine_s)[0]])[0]
     strain = load(time_s) / k_s + np.interp(time_s, fine_s, yielded)
     return _recorded(rng, time_s, load(time_s), strain, truth, "strain", sensor)
+
+
+def _followed(time_s: Array, course: Course, k: float, c: float) -> tuple[Array, Array]:
+    """Return fine times, and the stretch of a spring in series with a damper under a strain."""
+    from scipy.signal import lfilter
+
+    fine_s = np.linspace(0.0, time_s[-1], _FINE * len(time_s))
+    left = np.exp(-fine_s[1] * k / c)
+    # Exact for a strain that is linear from one fine time to the next.
+    factor = (1 - left) * c / (k * fine_s[1])
+    changes = np.diff(course(fine_s), prepend=0.0)
+    return fine_s, lfilter([factor], [1.0, -left], changes)
+
+
+def relaxing(rng: Rng, course: Callable[[Rng], tuple[Array, Course]], sensor: float = 0.0) -> Trace:
+    """Return the stress of a Zener solid under a strain that is recorded with it."""
+    (time_s, strain), truth = course(rng), {"k": 80.0, "k_p": 100.0, "c": 240.0}
+    fine_s, stretch = _followed(time_s, strain, truth["k"], truth["c"])
+    stress = truth["k_p"] * strain(time_s) + truth["k"] * np.interp(time_s, fine_s, stretch)
+    return _recorded(rng, time_s, strain(time_s), stress, truth, "stress", sensor)
+
+
+def presses(rng: Rng) -> Trace:
+    """Return the force of a sphere of 2.5 um, with a baseline, whose contact is 0 to 60 nm off."""
+    truth = {"k": 1200.0, "k_p": 800.0, "c": 3600.0}
+    at_s, off_m = float(rng.uniform(0.4, 0.6)), float(rng.uniform(0.0, 60e-9))
+    deepest_m, time_s = float(rng.uniform(400e-9, 600e-9)), np.arange(0.0, 20.0, 0.025)
+
+    def depth_m(t: Array) -> Array:
+        return np.minimum((t - at_s) * 2e-6, deepest_m)
+
+    def strain(t: Array) -> Array:
+        return np.maximum(depth_m(t), 0.0) ** 1.5
+
+    fine_s, stretch = _followed(time_s, strain, truth["k"], truth["c"])
+    moduli = truth["k_p"] * strain(time_s) + truth["k"] * np.interp(time_s, fine_s, stretch)
+    clean = 16 / 9 * np.sqrt(2.5e-6) * moduli
+    read = clean + np.max(clean) * (0.03 + 0.004 * rng.standard_normal(len(time_s)))
+    columns = {"time_s": time_s, "Force (N)": read, "Depth (m)": depth_m(time_s) - off_m}
+    return Trace(columns, truth)
+
+
+def rises(rng: Rng) -> Trace:
+    """Return the stress of a Zener solid under a strain of 1 that is reached within 2 s."""
+    truth, time_s = _zener(rng, 60.0), np.arange(1.0, 301.0) * 0.2
+    k, k_p, c = truth.values()
+    tau, inside = c / k, np.minimum(time_s, 2.0)
+    spring = tau * (np.exp(-(time_s - inside) / tau) - np.exp(-time_s / tau)) / 2.0
+    clean = k_p * inside / 2.0 + k * spring
+    read = clean + _NOISE * clean.max() * rng.standard_normal(len(clean))
+    return Trace({"time_s": time_s, "stress_Pa": read}, truth)
+
+
+def with_zero(rng: Rng) -> Trace:
+    """Return a creep whose sensor's zero is off by 5 % of the peak, with rows before the start."""
+    trace = held(rng, "creep", np.linspace(0.5, _LASTS_S, 200))
+    name, before_s = "J (1/Pa)", np.arange(-int(rng.integers(5, 60)), 1) * 0.5
+    read, sd = trace.columns[name], _NOISE * float(np.max(trace.columns[name]))
+    read = np.append(sd * rng.standard_normal(len(before_s)), read) + 2.5 * sd
+    return Trace({"time_s": np.append(before_s, trace.columns["time_s"]), name: read}, trace.truth)
 
 
 def resists(rng: Rng, course: Callable[[Rng], tuple[Array, Course]], sensor: float = 0.0) -> Trace:
@@ -335,6 +414,29 @@ def _set_ups() -> list[SetUp]:
             ("smooth, noisy sensor", creeps, _smooth, 0.002, creep),
         )
     ]
+    zener = "--reading=stress=stress_Pa", "--load=strain", "--model=zener_maxwell"
+    sphere = "--reading=force=Force (N)", "--load=Depth (m)", "--sphere=2.5 um"
+    rise = "--reading=stress=stress_Pa", "--hold=1", "--ramp=2s", "--model=zener_maxwell"
+    found += [
+        SetUp(ADDS, "zero, told by rows before", with_zero, (*_RESPONSES["creep"][2][1:], *told)),
+        SetUp(ADDS, "contact and baseline", presses, (*sphere, "--model=sls", "--contact=fit")),
+        SetUp(ADDS, "rise of 2 s", rises, rise),
+        SetUp(ADDS, "from mid-phase, Kelvin-Voigt", partial(resists, course=_mid_phase), resist),
+    ]
+    found += [
+        SetUp(
+            ADDS,
+            f"{name}, sensor of {100 * sensor:g} %",
+            partial(make, course=course, sensor=sensor),
+            options,
+        )
+        for name, make, course, options in (
+            ("held, relaxation", relaxing, _held_later, zener),
+            ("held, creep", creeps, _held_later, creep),
+            ("sine, relaxation", relaxing, _sine, zener),
+        )
+        for sensor in (0.002, 0.01, 0.05)
+    ]
     read = "--frequency=omega_rad_per_s", "--reading=storage=storage_Pa", "--reading=loss=loss_Pa"
     taken = (
         ("maxwell", "kelvin_voigt"),
@@ -434,6 +536,14 @@ that was, and doubt is right.
 
 {load}
 
+## What the instrument adds
+
+A zero off by 5 % of the peak, of which rows before the start tell; a contact 0 to 60 nm off, beside
+a baseline of 3 %; a rise that is told; an oscillation recorded from any phase on; records whose
+sensor has noise.
+
+{adds}
+
 ## A frequency sweep
 
 25 frequencies over three decades, noise of 2 and 3 % of storage and loss modulus.
@@ -471,7 +581,7 @@ def _held(row: Any) -> str:
 
 def _page(rows: pd.DataFrame) -> str:
     """Return the page of all set-ups."""
-    of = {group: rows[rows["group"] == group] for group in (RIGHT, LOAD, SWEEP, WRONG)}
+    of = {group: rows[rows["group"] == group] for group in (RIGHT, LOAD, ADDS, SWEEP, WRONG)}
     own = of[SWEEP][~of[SWEEP]["set_up"].str.contains(_TAKEN)]
     told = of[LOAD][of[LOAD]["set_up"] != _UNKNOWN]
     right, wrong = pd.concat([of[RIGHT], told, own]), of[WRONG]
@@ -493,6 +603,7 @@ def _page(rows: pd.DataFrame) -> str:
         all_tests=len(ALARMS),
         none=share_in_words(0, int(in_time["traces"].sum())),
         load=_table(of[LOAD]),
+        adds=_table(of[ADDS]),
         sweep=_table(of[SWEEP]),
         wrong=_table(wrong, wrong=True),
     )

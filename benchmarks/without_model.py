@@ -23,7 +23,7 @@ import pandas as pd
 from benchmarks.one_thread import keep_to_one_thread
 from biogrip.arrays import Array
 from biogrip.files import write_text
-from biogrip.judging.without_model import Estimate, tell_without_model
+from biogrip.judging.without_model import LinearLimits, tell_without_model
 from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import NO_ARMS, Arm, Gripper
 from biogrip.physics.instruments import INSTRUMENTS
@@ -151,7 +151,7 @@ class Truth:
         responses[elapsed > 0] = inverted(lambda s: self._response(s) / s**power, each)[which]
         return responses @ heights
 
-    def value(self, told: Estimate) -> float:
+    def value(self, told: LinearLimits) -> float:
         """Value of a quantity by its name."""
         name, at = told.quantity, told.at_s or 0.0
         if "rad/s" in name:
@@ -212,7 +212,7 @@ def residuals(name: str, readings: Array) -> Residuals:
     return Residuals(gripper, MODELS["maxwell"], condensed.course, trace, instrument=instrument)
 
 
-def first_order(truth: Truth, told: list[Estimate], noise_sd: float) -> list[float]:
+def first_order(truth: Truth, told: list[LinearLimits], noise_sd: float) -> list[float]:
     """Return widths of the right model's limits of quantities; inf where it tells nothing."""
     logs = np.log(truth.parameters)
 

@@ -49,7 +49,7 @@ names = dict(re.findall(r'(\d+)\[label = "(\w+)"', dot.stdout))
 reads = [(names[a], names[b]) for a, b in re.findall(r"(\d+) -> (\d+)", dot.stdout)]
 place, lines = lay_out(nx.transitive_reduction(nx.DiGraph(sorted(reads))))
 with styled():
-    drawn = Figure((7.2, 2.0))
+    drawn = Figure((7.2, 2.9))
     axes = drawn.add_axes((0.05, 0.05, 0.9, 0.9))
     axes.axis("off")
     for line in lines:

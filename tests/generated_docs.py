@@ -4,6 +4,7 @@ import ast
 import json
 import re
 import textwrap
+from collections import Counter
 from collections.abc import Callable, Iterable
 from contextlib import redirect_stderr, redirect_stdout, suppress
 from functools import cache
@@ -73,28 +74,77 @@ def paper_against_study() -> str:
 def readings_compared() -> str:
     table = read_table(_path("readings", "readings"))
 
-    def likelihood(row: dict[str, str], end: str) -> str:
-        value, error = (float(row[f"likelihood{name}{end}"]) for name in ("", "_error"))
+    def likelihood(row: dict[str, str], name: str) -> str:
+        value, error = (float(row[f"{name}{end}"]) for end in ("", "_error"))
         return f"{round(value, 1) + 0.0:.1f} ± {error:.1f}"
 
-    lost = [f"“{row['reading']}”" for row in table if row["verdict"] == "excluded"]
-    said = f"**By their likelihood {', '.join(lost) or 'none'} are excluded; the other "
-    said += f"{len(table) - len(lost)} are not told apart.**"
+    counts = Counter(row["verdict"] for row in table)
+    said = ", ".join(f"{count} {verdict}" for verdict, count in counts.items())
     rows = _table(
         {
             "interpretation": row["reading"],
             "values held": f"{row['with_error']} of {row['values']}",
-            "log₁₀ likelihood": likelihood(row, ""),
-            "half the width": likelihood(row, "_half"),
-            "twice": likelihood(row, "_twice"),
+            "log₁₀ likelihood": likelihood(row, "likelihood"),
+            "without Table 7": likelihood(row, "without_shared"),
+            "speaks most against it": row["decides"]
+            and f"{row['decides']} ({float(row['least']):.1f})",
+            "runs that count": row["counted"],
             "last improvement, Tables 5, 6, 7": ", ".join(
                 f"{float(row[f'last_improvement_{number}']):.0f}" for number in (5, 6, 7)
             ),
             "by its likelihood": row["verdict"],
         }
-        for row in table
+        for row in sorted(table, key=lambda row: -float(row["likelihood"]))
     )
-    return f"{said}\n\n{rows}"
+    return f"**Of {len(table)} interpretations: {said}.**\n\n{rows}"
+
+
+def joint() -> str:
+    """Interpretations that change noise, rate, device and encoding, and nothing else, together."""
+    config = yaml.safe_load((ROOT / "config" / "readings.yaml").read_text("utf-8"))["readings"]
+    compared = {row["reading"]: row for row in read_table(_path("readings", "readings"))}
+    found = pd.read_csv(_path("readings_found", "readings")).set_index(["reading", "case"])
+    rows = []
+    for block in config.values():
+        changes, title = block["changes"], block["title"]
+        measured = changes.get("measurement", {})
+        noise = measured.get("noise", {"kind": "gaussian"})
+        encoding = {"": "two from 1", "4": "four from 0"}.get(_digits_of(changes))
+        kind = {
+            "gaussian": "Gaussian, 10 % of the peak",
+            "uniform": "uniform within 10 % of the signal",
+        }
+        told = noise == {"kind": "gaussian"} or (
+            noise.get("reference") == "signal" and "level" in noise
+        )
+        others = {*changes} - {"search_range", "measurement", "gripper"} or block.keys() - {
+            "title",
+            "changes",
+        }
+        if encoding is None or others or not told or measured.get("rate_Hz", 10.0) > 10:
+            continue
+        cell, drop = (found.loc[title, case] for case in ("endothelial_cell", "liquid_drop_2"))
+        rows.append(
+            {"noise": kind[noise["kind"]], "rate (Hz)": f"{measured.get('rate_Hz', 10.0):g}"}
+            | {"arms (mm)": f"{1e3 * changes.get('gripper', {}).get('arm_length_m', 1.5e-3):g}"}
+            | {
+                "digits": encoding,
+                "log₁₀ likelihood": f"{float(compared[title]['likelihood']):.1f}",
+            }
+            | {"by its likelihood": compared[title]["verdict"]}
+            | {"cell near the noise": _share(cell, "near_noise")}
+            | {"error of k, cell": f"{cell['error_percent k']:.2g} %"}
+            | {"of k, drop 2": f"{drop['error_percent k']:.2g} %"}
+            | {"last improvement, Table 5": f"{cell['last_improvement']:.0f}"}
+        )
+    return _table(sorted(rows, key=lambda row: [*row.values()][:4]))
+
+
+def _digits_of(changes: dict[str, Any]) -> str:
+    """Of the encoding, "" if it is the text's; other than from 0, their number is not enough."""
+    genes = changes.get("search_range", {}).get("k")
+    from_0 = genes and genes.get("first_digit") == 0
+    return "" if genes is None else str(genes.get("digits")) if from_0 else "other"
 
 
 def choices() -> str:
@@ -122,35 +172,30 @@ def protocols_compared() -> str:
     return _table(
         {"sample and protocol": row["case"], "quantity": row["quantity"]}
         | {"lowest jaw force (µN)": f"{row['lowest_force_uN']:.2g}"}
-        | {"noise (µrad)": f"{row['noise_urad']:.3g}", "bound": f"{row['bound_percent']:.2g} %"}
+        | {"noise (µrad)": f"{row['noise_urad']:.3g}", "(nrad/√Hz)": f"{row['density_nrad']:.3g}"}
+        | {"bound, rest known": f"{row['bound_percent']:.2g} %"}
+        | {"at the paper's density": f"{row['bound_same_density_percent']:.2g} %"}
         | {f"within 10 % of {row['seeds']}": _share(row, "enough")}
         for row in table.to_dict("records")
     )
 
 
-# Tables that judge claims by 500 traces, or over levels of noise, and the published study of each.
-_JUDGING = {"coverage": "coverage"}
-_JUDGING |= dict.fromkeys(("robustness_noise", "robustness_gripper"), "robustness")
-
-
 def _claims() -> list[dict[str, str]]:
-    """Return the claims in their order, each row with the verdict that the most runs decide."""
-    tables = {name: pd.read_csv(_path(name, study)) for name, study in _JUDGING.items()}
+    """Return the claims in their order, each by the study of the most runs that can judge it."""
+    tables = {"robustness_noise": pd.read_csv(_path("robustness_noise", "robustness"))}
     add_columns(tables)
     numbers = {case.name: case.published.table for case in STUDY.cases.values()}
     for table in tables.values():
         table["of_table"] = table["case"].map(numbers).astype("Int64")
     every = yaml.safe_load((ROOT / "workflow" / "paper" / "claims.yaml").read_text("utf-8"))
-    told = [claim for claim in every if claim.get("rows", {}).get("table") in {*_JUDGING, "slopes"}]
+    told = [claim for claim in every if claim.get("rows", {}).get("table") == "by_noise"]
     rows = [dict(row) for row in judge_all(told, Results(STUDY, tables), "").rows]
     for name in ("readings", ""):
         rows += read_table(_path("claims", name))
     found: dict[str, dict[str, dict[str, str]]] = {claim["words"]: {} for claim in every}
     for row in rows:
-        if row["verdict"] != "judged elsewhere" and not row["evidence"].startswith("Not here"):
-            before = found[row["claim"]].setdefault(row["of"], row)
-            if before["verdict"] == "too few runs to tell":
-                found[row["claim"]][row["of"]] = row
+        if row["verdict"] != "judged elsewhere":
+            found[row["claim"]].setdefault(row["of"], row)
     return [row for rows_of_claim in found.values() for row in rows_of_claim.values()]
 
 
@@ -335,10 +380,10 @@ PARTS: dict[str, dict[str, Callable[[], str]]] = {
     "docs/robustness.md": {"errors": errors_by_noise},
     "docs/claims.md": {"claims": claims_judged},
     "docs/reproduction.md": {
-        "claims": lambda: answers.say_what_claims_are(_claims()),
         "results": paper_against_study,
         "readings": readings_compared,
         "choices": choices,
+        "joint": joint,
         "told": lambda: answers.say_what_traces_tell(read_table(_COVERAGE), _CASES),
         "protocols": protocols_compared,
     },

@@ -130,7 +130,7 @@ def test_what_cannot_be_used_is_said_by_the_name_of_the_argument() -> None:
         ({"config": {"protocl": {}}}, "protocl"),
         ({"config": [1]}, r"config: found \[1\], allowed are values by name"),
         ({"fixed": {1: 2.0}}, "fixed: found {1: 2.0}, allowed are values by name"),
-        ({"model": "zener_k"}, "model: .*found 'zener_k'. Did you mean 'zener_kelvin'"),
+        ({"model": "zener_k"}, "model: .*found 'zener_k'. Did you mean .*'zener_kelvin'"),
         ({"model": 5}, "model: .*found "),
         ({"start": "soon"}, "start: measurement.start_s: found 'soon', allowed is a number"),
         ({"start": np.array([1.0, 2.0])}, "start: measurement.start_s: found .*, allowed is a num"),

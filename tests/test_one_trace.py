@@ -367,17 +367,12 @@ def test_only_what_can_be_published_is_said_for_a_paper() -> None:
     found = {"fit": "ok", "confidence": 0.95, "quantities": quantities}
     for fit in ("doubtful", "rejected"):
         assert for_a_paper(found | {"fit": fit}) == []
-    lines = for_a_paper(found)
-    assert [text for text, _ in lines] == [
+    assert for_a_paper(found) == [
         "c + c_p = 2e-09 N s/m (95 % profile-likelihood interval 1e-09 to 40, n = 1 trace, "
         "provided it relaxes)",
         "c + c_p < 40 N s/m (97.5 % one-sided limit, n = 1 trace)",
         "c + c_p > 1e-09 N s/m (97.5 % one-sided limit, n = 1 trace)",
     ]
-    assert lines[0][1] == (
-        r"$c + c_{p}$ = $2 \times 10^{-9}$ N s/m (95 \% profile-likelihood interval "
-        r"$1 \times 10^{-9}$ to 40, n = 1 trace, provided it relaxes)"
-    )
 
 
 def test_noise_is_named_by_who_says_what_it_is() -> None:

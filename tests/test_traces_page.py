@@ -13,7 +13,7 @@ from biogrip.command import files as command
 from biogrip.command.files import identify_batch
 from biogrip.command.options import Setting
 from biogrip.command.outputs import Outcome
-from biogrip.command.page import beyond, common, draw_traces, write_page
+from biogrip.command.page import beyond, common, draw_every_trace, write_page
 from biogrip.command.settings import Asked
 from biogrip.command.words import columns_of, for_a_paper
 from tests.helpers.identified import write_drop
@@ -70,10 +70,8 @@ def test_a_page_begins_with_status_value_and_interval(example: Outcome, tmp_path
     unfolded = re.sub("<details>.*?</details>", "", text, flags=re.DOTALL)
     assert "search_range:" in text
     assert "search_range:" not in unfolded
-    assert r"95\,\%" not in unfolded
     lines = for_a_paper(example.found[0])
-    assert len(lines) == sum(f"<p>{line}</p>" in text for line, _ in lines) == 6
-    assert r"$k_{p}$ = 5.01 N/m (95 \% profile-likelihood interval " in text
+    assert len(lines) == sum(f"<p>{line}</p>" in text for line in lines) == 6
 
 
 def test_pictures_are_small_and_in_the_page(page: Path) -> None:
@@ -95,7 +93,7 @@ def test_the_figure_is_by_the_words_of_the_table(dish: Outcome) -> None:
         each["trace"]: {"day": f"{number % 4}", "drug": "ab"[number % 2], "size": f"{number}"}
         for number, each in enumerate(dish.found)
     }
-    drawn, said = draw_traces(replace(dish, copied=words), columns_of(dish.found))
+    drawn, said = draw_every_trace(replace(dish, copied=words), columns_of(dish.found))
     assert said == "Groups: drug. Large marks: means of each day."
     axes = drawn.axes[0]
     assert [label.get_text() for label in axes.get_xticklabels()] == ["a", "b"]
@@ -106,11 +104,13 @@ def test_the_figure_is_by_the_words_of_the_table(dish: Outcome) -> None:
     assert sum(line.get_markerfacecolor() == "white" for line in points) == 1
     # By units the chance is another one than by cells.
     by_cell = {name: {"drug": own["drug"]} for name, own in words.items()}
-    others = draw_traces(replace(dish, copied=by_cell), columns_of(dish.found))[0].axes[0].texts
+    others = (
+        draw_every_trace(replace(dish, copied=by_cell), columns_of(dish.found))[0].axes[0].texts
+    )
     assert [it.get_text() for it in axes.texts] != [it.get_text() for it in others]
     words[dish.found[0]["trace"]] = {"other": "of another table"}
-    assert draw_traces(replace(dish, copied=words), columns_of(dish.found))[0].axes
-    drawn, said = draw_traces(dish, columns_of(dish.found))
+    assert draw_every_trace(replace(dish, copied=words), columns_of(dish.found))[0].axes
+    drawn, said = draw_every_trace(dish, columns_of(dish.found))
     assert said == "Cells are taken for independent."
     assert [label.get_text() for label in drawn.axes[0].get_xticklabels()] == ["all traces"]
 
@@ -136,10 +136,6 @@ def test_the_methods_have_the_numbers_of_the_study(page: Path) -> None:
         "Something is odd). Not identified: 1 (bad.csv: found 'high'). Computed with biogrip 1.0.0",
     ):
         assert words in said
-    latex = text.partition("<pre>")[2].partition("</pre>")[0]
-    assert r"$1.6 \times 10^{-9}$ N m" in latex
-    assert r"95 \% profile-likelihood" in latex
-    assert not re.search(r"(?<!\\)[%_#&]", latex)
 
 
 def test_of_very_many_traces_there_is_the_table_and_the_page_says_so(

@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from biogrip import __version__
-from biogrip.command.options import GROUPS, Setting
+from biogrip.command.options import GROUPS, REPLACED, Setting
 from biogrip.errors import BiogripError, nearest
 from biogrip.terminal import visible, visible_lines
 
-_SHOWN = 200
+_FILE_NAME_SHOWN = 200
 _USUAL = ("sls", "zener_kelvin", "kelvin_voigt", "maxwell", "burgers", "power_law")
 
 
@@ -40,7 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 128 + signal.SIGPIPE
     except OSError as error:
         # Errors of the operating system: no permission, a name too long, ...
-        place = "" if error.filename is None else f"{visible(error.filename)[:_SHOWN]}: "
+        place = "" if error.filename is None else f"{visible(error.filename)[:_FILE_NAME_SHOWN]}: "
         print(f"biogrip: {place}{error.strerror or error}.", file=sys.stderr)
         return 1
     return int(status)
@@ -62,7 +62,7 @@ class _Parser(argparse.ArgumentParser):
 
     def format_help(self) -> str:
         """Return the help, with the sample models where one is to be named."""
-        lines = _models() if self.lists_models else []
+        lines = _model_lines() if self.lists_models else []
         if self.examples:
             lines += ["", "examples:", *(f"  biogrip {example}" for example in self.examples)]
         lines += ["", self.cost] if self.cost else []
@@ -70,30 +70,33 @@ class _Parser(argparse.ArgumentParser):
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Refuse unknown options with the usage of their command, and the nearest that there is."""
-        found, unknown = super().parse_known_args(args, namespace)
+        parsed, unknown = super().parse_known_args(args, namespace)
         if unknown:
-            near = nearest(unknown[0].partition("=")[0], self._option_string_actions)
+            option = unknown[0].partition("=")[0]
+            if new := REPLACED.get(option.removeprefix("--")):
+                self.error(f"{option}: is now --{new}, as in --{new} 'sphere 2.5 um'.")
+            near = nearest(option, self._option_string_actions)
             self.error(f"unrecognized arguments: {' '.join(unknown)}.{near}")
-        return found, unknown
+        return parsed, unknown
 
     def error(self, message: str) -> NoReturn:
         """Print a usage error and exit."""
         super().error(visible_lines(message))
 
 
-def _models() -> list[str]:
+def _model_lines() -> list[str]:
     """Return the names and titles of the sample models, usual ones first."""
     from biogrip.physics.models import ALIASES, MODELS
 
     width = max(map(len, MODELS))
-    lines = ["", "sample models (other names; prony3: generalized_maxwell_3 without c_p):"]
+    lines = ["", "sample models (other names; prony3, sls3: generalized_maxwell_3 without c_p):"]
     shown = {ALIASES.get(name, name): name for name in _USUAL}
     shown |= {name: name for name in MODELS if name not in shown}
     for name, usual in shown.items():
         others = [other for other in (*ALIASES, *MODELS) if ALIASES.get(other, other) == name]
         also = ", ".join(other for other in others if other != usual)
         lines.append(f"  {usual:<{width}}  {MODELS[name].title}" + (f" ({also})" if also else ""))
-    return lines
+    return [*lines, f"  {'jeffreys':<{width}}  Burgers fluid without its spring"]
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -105,7 +108,7 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _read(reader: Callable[[str], Any]) -> Callable[[str], Any]:
+def _with_message(reader: Callable[[str], Any]) -> Callable[[str], Any]:
     """Return a reader whose message argparse shows."""
 
     def read(text: str) -> Any:
@@ -146,7 +149,9 @@ def _add_settings(parser: Any) -> None:
         group = parser.add_argument_group(title)
         for name, metavar, key, text in options:
             names = [name] if metavar else [name, name.replace("--", "--no-")]
-            of_key: dict[str, Any] = {"dest": key} if isinstance(key, str) else {"type": _read(key)}
+            of_key: dict[str, Any] = (
+                {"dest": key} if isinstance(key, str) else {"type": _with_message(key)}
+            )
             of_key |= {"metavar": metavar} if metavar else {"nargs": 0}
             group.add_argument(*names, action=_Set, help=text, **of_key)
         if title == "what was done":
@@ -171,7 +176,7 @@ def _add_identify(commands: Any) -> None:
         "identify cell.csv --config my_gripper.yaml --model liquid_drop --report page.html",
         "identify creep.csv --reading 'strain=Strain [%]' --time 'Time [s]' --hold 5Pa --model sls",
         "identify afm.txt --reading 'force=Load (uN)' --time 'Time (s)' "
-        "--load 'Indentation (nm)' --sphere '25 um' --model sls",
+        "--load 'Indentation (nm)' --shape 'sphere 25 um' --model sls",
         """identify sweep.csv --reading "storage=G' (Pa)" --reading "loss=G'' (Pa)" """
         "--frequency 'f (Hz)' --model power_law",
         "identify cells.tsv --config my_gripper.yaml --csv found.csv",

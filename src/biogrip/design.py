@@ -390,6 +390,6 @@ def _said(
     yield aligned(rows, ("sample", "", "config's protocol", "designed"))
     yield from notes
     yield (
-        "A bound is the least standard deviation (Cramér-Rao) in percent of the value, with all "
-        "parameters unknown that are not fixed. The noise is white, and the same under both."
+        "A bound is the least standard deviation (Cramér-Rao) in percent of the value, with what "
+        "has none taken as known, too. The noise is white, and the same under both."
     )

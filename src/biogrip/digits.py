@@ -27,10 +27,10 @@ def rounded(value: float | None) -> float | None:
     if value is None:
         return None
     for digits in range(_ROUNDED_DIGITS, _MOST_ROUNDED_DIGITS):
-        found = float(f"{value:.{digits}g}")
+        shorter = float(f"{value:.{digits}g}")
         fewer = range(2, _ROUNDED_DIGITS)
-        if found == value or all(f"{found:.{few}g}" == f"{value:.{few}g}" for few in fewer):
-            return found
+        if shorter == value or all(f"{shorter:.{few}g}" == f"{value:.{few}g}" for few in fewer):
+            return shorter
     return float(f"{value:.{_ROUNDED_DIGITS}g}")
 
 
@@ -81,12 +81,12 @@ def within_limits(value: float, low: float, high: float, *others: float) -> list
     """
     numbers = (value, low, high, *others)
     if not 0 < low <= high <= _FAR_APART * low:
-        return [*(plain(each, 2) for each in numbers[:3]), *map(plain, others)]
+        return [*(plain(number, 2) for number in numbers[:3]), *map(plain, others)]
     last = min(_power(high) - 2, _power((high - low) / 4) if high > low else -_LARGEST)
     last = max(last, _power(high) + 1 - _MOST_DIGITS_WITH_LIMITS)
     if _SMALLEST_PLAIN <= value < _LARGEST_PLAIN:
-        return [f"{round(each, -last):.{max(-last, 0)}f}" for each in numbers]
-    return [f"{each:.{max(_power(each) - last, 0)}e}" for each in numbers]
+        return [f"{round(number, -last):.{max(-last, 0)}f}" for number in numbers]
+    return [f"{number:.{max(_power(number) - last, 0)}e}" for number in numbers]
 
 
 def with_limits(value: float, low: float, high: float, unit: str = "") -> str:
@@ -99,7 +99,7 @@ def instant(time_s: float, low_s: float, high_s: float) -> str:
     """Return a time of any clock and its limits, with two digits of how far the nearer one is."""
     sides = [side_s for side_s in (time_s - low_s, high_s - time_s) if side_s > 0]
     decimals = max(1 - _power(2 * min(sides)), 0) if sides else _MOST_DIGITS_WITH_LIMITS
-    time, low, high = (f"{each:z.{decimals}f}" for each in (time_s, low_s, high_s))
+    time, low, high = (f"{time:z.{decimals}f}" for time in (time_s, low_s, high_s))
     return f"{time} s ({low} to {high})"
 
 
@@ -128,9 +128,9 @@ _BEFORE_UNIT = re.compile(
 def legible(text: str) -> str:
     """Return text for print: 1.1e-05 as 1.1·10⁻⁵, 3.4e+03 as 3400, units on their numbers' line."""
 
-    def power(found: re.Match[str]) -> str:
-        number, tens = plain(float(found[0]), 4), f"{int(found[2])}".translate(SUPERSCRIPTS)
-        return f"{found[1]}·10{tens}" if "e" in number else number
+    def power(match: re.Match[str]) -> str:
+        number, tens = plain(float(match[0]), 4), f"{int(match[2])}".translate(SUPERSCRIPTS)
+        return f"{match[1]}·10{tens}" if "e" in number else number
 
     return _BEFORE_UNIT.sub("\u00a0", _MINUS.sub("−", _E_NOTATION.sub(power, text)))
 

@@ -4,12 +4,13 @@
 """
 
 import re
-from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from math import inf, nan
 from pathlib import Path
 from textwrap import fill
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from biogrip import __version__
 from biogrip.command.outputs import COLUMNS as OF_TRACES
@@ -18,16 +19,7 @@ from biogrip.command.words import in_sentences, outcome_in_words, paragraph, tog
 from biogrip.digits import counted, plain, rounded_numbers, with_limits, with_unit
 from biogrip.errors import BiogripError, nearest
 from biogrip.files import atomic_write
-from biogrip.judging.cells import (
-    COLUMNS,
-    Cell,
-    Compared,
-    Told,
-    at_bounds,
-    compare,
-    gather,
-    shared_columns,
-)
+from biogrip.judging.cells import COLUMNS, Cell, Compared, Told, compare, gather, shared_columns
 from biogrip.judging.doubts import DOUBTFUL, OK, REJECTED
 from biogrip.judging.verdicts import (
     BOUNDED_ABOVE,
@@ -50,7 +42,7 @@ _NUMBERS: dict[str, tuple[str, ...]] = {
 }
 _FITS = OK, DOUBTFUL, REJECTED, FAILED
 _CONFIDENCES = 0.5, 0.99
-_ONE_SIDED = {BOUNDED_ABOVE: ("at most", "lower"), BOUNDED_BELOW: ("at least", "higher")}
+_ONE_SIDED = {BOUNDED_ABOVE: "at most", BOUNDED_BELOW: "at least"}
 _UNDATED: dict[str, dict[str, None]] = {"png": {}, "pdf": {"CreationDate": None}}
 # Most names that a line has.
 _FEW = 5
@@ -70,125 +62,179 @@ def groups(
     may say what was repeated. Traces of a cell, as a column `cell` says, are averaged. Another
     file, or a column that is not there, is a `BiogripError`.
     """
+    _check_names(found, by, unit, table, plot)
+    grouped = _read(found, by, unit)
+    cells = grouped.gathered(unit)
+    compared = grouped.compared(cells)
+    lines = [
+        _counts(grouped, cells, found),
+        _printed(compared, grouped),
+        *_left_out(grouped, cells),
+        *_not_determined(cells, compared),
+        *_pairs(cells, compared, grouped),
+        *_without_p(compared),
+        *([] if unit else _shared(grouped)),
+        *_without_doubtful(grouped, cells),
+        "",
+        "For a paper:",
+        fill(_for_a_paper(grouped, cells, compared), _WIDTH),
+    ]
+    print(visible_lines("\n".join(lines)))
+    if table is not None:
+        _write_table(table, compared, grouped.units)
+    if plot is not None:
+        _draw(cells, compared, grouped, plot)
+    if written := [visible(path) for path in (table, plot) if path]:
+        print(f"Written to {', '.join(written)}.")
+
+
+@dataclass(frozen=True)
+class _Grouped:
+    """What a table of traces tells of groups."""
+
+    by: str
+    """Column that makes the groups."""
+    unit: str | None
+    """Column of what was repeated, if there is one."""
+    units: Mapping[str, str]
+    """Units of numbers, by quantity."""
+    traces: Sequence[Mapping[str, str]]
+    """All rows, by column."""
+    used: Sequence[Mapping[str, str]]
+    """Rows of a group that tell anything."""
+    told: Sequence[Told]
+    """What these tell."""
+    confidence: float
+    """Confidence of all limits."""
+
+    @property
+    def made_by(self) -> list[str]:
+        """Columns that make groups, and units in them."""
+        return [self.by, *([self.unit] if self.unit else [])]
+
+    @property
+    def names(self) -> list[str]:
+        """Groups, in the order of the table."""
+        rows = (row for row in self.traces if all(row[name] for name in self.made_by))
+        return list(dict.fromkeys(row[self.by] for row in rows))
+
+    def gathered(self, unit: str | None) -> list[Cell]:
+        """Return the cells of the traces, with what was repeated by a column."""
+        return gather(self.told, self.by, unit, self.confidence)
+
+    def compared(self, cells: Sequence[Cell]) -> Compared:
+        """Return the comparison of cells, by units if they have any."""
+        return compare(cells, self.names, self.confidence, units=any(it.unit for it in cells))
+
+
+def _check_names(
+    found: Path, by: str, unit: str | None, table: Path | None, plot: Path | None
+) -> None:
     if problem := trace_file_problem(found):
         raise BiogripError(f"FOUND: {problem}")
     if unit == by:
         raise BiogripError("--unit: found the column of --by; allowed is another, as of dishes.")
+    check_outputs([("--csv", table), ("--plot", plot)], [found])
+    if plot is not None and plot.suffix not in (".png", ".pdf"):
+        text = f"found {visible(plot)}; allowed is a name that ends with .png or .pdf."
+        raise BiogripError(f"--plot: {text}")
+
+
+def _read(found: Path, by: str, unit: str | None) -> _Grouped:
+    """Read the table that `identify` wrote; refuse what it does not write."""
     header, *rows = read_rows(found)
     units = _units(header)
     columns = [column for item in units.items() for column in _columns(*item).values()]
-    made_by = [by] if unit is None else [by, unit]
-    for name in ("trace", "fit", "confidence", *made_by, *columns):
+    made_by = [by, *([unit] if unit else [])]
+    _check_header(found, header, ("trace", "fit", "confidence", *made_by, *columns))
+    traces = [dict(zip(header, map(visible, row), strict=True)) for row in rows]
+    # Names of two of the columns end with the unit of what is read.
+    ours = {*OF_TRACES, *columns}
+    copied = {it for it in header if it not in ours and not it.startswith(("noise", "misfit"))}
+    used, told = [], []
+    for number, trace in enumerate(traces, start=2):
+        where = f"{visible(found)}, row {number} ({trace['trace']})"
+        if trace["fit"] not in _FITS:
+            _refuse(trace, "fit", ", ".join(_FITS), where)
+        if all(trace[name] for name in made_by) and _is_used(trace):
+            used.append(trace)
+            told.append(_told(trace, copied | {*made_by}, units, where))
+    confidence = _confidence(found, {float(trace["confidence"]) for trace in used})
+    return _Grouped(by, unit, units, traces, used, told, confidence)
+
+
+def _check_header(found: Path, header: Sequence[str], wanted: Iterable[str]) -> None:
+    for name in wanted:
         if header.count(name) != 1:
             many, near = ("two", "") if name in header else ("no", nearest(name, header))
             raise BiogripError(
                 f"{visible(found)}: found {many} column '{name}'; allowed is a table that `biogrip "
                 f"identify --csv` wrote, and of --by and --unit columns of it.{near}"
             )
-    traces = [dict(zip(header, map(visible, row), strict=True)) for row in rows]
-    # Names of two of the columns end with the unit of what is read.
-    mine = {*OF_TRACES, *columns}
-    copied = {it for it in header if it not in mine and not it.startswith(("noise", "misfit"))}
-    used, told = [], []
-    for number, own in enumerate(traces, start=2):
-        where = f"{visible(found)}, row {number} ({own['trace']})"
-        if own["fit"] not in _FITS:
-            _refuse(own, "fit", ", ".join(_FITS), where)
-        if all(own[name] for name in made_by) and _is_used(own):
-            used.append(own)
-            told.append(_told(own, copied | {*made_by}, units, where))
-    check_outputs([("--csv", table), ("--plot", plot)], [found])
-    if plot is not None and plot.suffix not in (".png", ".pdf"):
-        text = f"found {visible(plot)}; allowed is a name that ends with .png or .pdf."
-        raise BiogripError(f"--plot: {text}")
-    levels = sorted({float(own["confidence"]) for own in used})
+
+
+def _confidence(found: Path, levels: set[float]) -> float:
     if len(levels) != 1:
-        of = " and ".join(map(str, levels)) or "no trace of a group"
+        several = " and ".join(map(str, sorted(levels))) or "no trace of a group"
         raise BiogripError(
-            f"{visible(found)}: found limits of {of}; allowed are those of one confidence, of "
+            f"{visible(found)}: found limits of {several}; allowed are those of one confidence, of "
             "traces that were identified."
         )
-    (confidence,) = levels
-    cells = gather(told, by, unit, confidence)
-    names = list(dict.fromkeys(own[by] for own in traces if all(own[it] for it in made_by)))
-    compared = compare(cells, names, confidence, units=unit is not None)
-    counts = [counted(len(used), "trace"), counted(len(cells), "cell")]
-    counts += [f"{len({(it.group, it.unit) for it in cells})} units ({unit})"] if unit else []
-    lines = [
-        f"{visible(found)}: {', '.join(counts)}, {100 * confidence:g} % limits",
-        _printed(compared, names, units, unit),
-        *_left_out(traces, made_by, cells, told),
-        *_not_known(cells, compared, confidence, unit),
-        *_not_paired(cells, unit),
-        *([] if unit else _shared(told, by, names, confidence, compared)),
-    ]
-    if doubtful := [cell.name for cell in cells if cell.doubtful]:
-        sound = [cell for cell in cells if not cell.doubtful]
-        again = compare(sound, names, confidence, units=unit is not None)
-        lines += [f"Without the doubtful {_few(doubtful)}:", _printed(again, names, units, unit)]
-    made = (in_sentences(own[METHODS]) for own in used if own.get(METHODS))
-    outcome = ((it["trace"], it["fit"], it.get(REASONS) or it.get(FAILED, "")) for it in traces)
-    text, latex = paragraph(
-        [*together(made), *outcome_in_words(outcome), *_tests(cells, names, by, unit)],
-        max(own.get(WRITTEN_BY, "") for own in used) or __version__,
-    )
-    lines += ["", "For a paper:", fill(text, _WIDTH), "", "As LaTeX:", fill(latex, _WIDTH)]
-    print(visible_lines("\n".join(lines)))
-    if table is not None:
-        lines_of = ([*key, units[key[0]], *map(row.get, COLUMNS)] for key, row in compared.items())
-        columns = ["quantity", "group", "unit", *COLUMNS, WRITTEN_BY]
-        write_rows(table, columns, ([*rounded_numbers(row), __version__] for row in lines_of))
-    if plot is not None:
-        _draw(cells, compared, units, plot)
-    if said := [visible(path) for path in (table, plot) if path]:
-        print(f"Written to {', '.join(said)}.")
+    return levels.pop()
 
 
-def _draw(cells: Sequence[Cell], compared: Compared, units: Mapping[str, str], plot: Path) -> None:
+def _write_table(table: Path, compared: Compared, units: Mapping[str, str]) -> None:
+    rows = ([*key, units[key[0]], *map(row.get, COLUMNS)] for key, row in compared.items())
+    columns = ["quantity", "group", "unit", *COLUMNS, WRITTEN_BY]
+    write_rows(table, columns, ([*rounded_numbers(row), __version__] for row in rows))
+
+
+def _draw(cells: Sequence[Cell], compared: Compared, grouped: _Grouped, plot: Path) -> None:
     # Imported here: loading Matplotlib takes long.
     from biogrip.figures.cells import ONE_COLUMN_IN, draw_cells
     from biogrip.figures.style import styled
 
     with styled(), atomic_write(plot) as scratch:
-        drawn = draw_cells(cells, compared, units, ONE_COLUMN_IN)
+        drawn = draw_cells(cells, compared, grouped.units, ONE_COLUMN_IN, grouped.unit)
         kind = plot.suffix.removeprefix(".")
         mark = {"Creator" if kind == "pdf" else "Software": f"{WRITTEN_BY} {__version__}"}
         drawn.savefig(scratch, format=kind, dpi=300, metadata=mark | _UNDATED[kind])
 
 
-def _told(own: Mapping[str, str], copied: set[str], units: Mapping[str, str], where: str) -> Told:
+def _told(trace: Mapping[str, str], copied: set[str], units: Mapping[str, str], where: str) -> Told:
     """Return what a row tells; refuse what `identify` does not write there."""
     lowest, highest = _CONFIDENCES
-    if not lowest <= _number(own["confidence"]) <= highest:
-        _refuse(own, "confidence", f"a number from {lowest} to {highest}", where)
+    if not lowest <= _number(trace["confidence"]) <= highest:
+        _refuse(trace, "confidence", f"a number from {lowest} to {highest}", where)
     quantities = {}
     for name, unit in units.items():
         columns = _columns(name, unit)
-        if (verdict := own[columns["verdict"]]) not in _NUMBERS:
-            _refuse(own, columns["verdict"], ", ".join(_NUMBERS).rstrip(", "), where)
+        if (verdict := trace[columns["verdict"]]) not in _NUMBERS:
+            _refuse(trace, columns["verdict"], ", ".join(_NUMBERS).rstrip(", "), where)
         least, above, numbers = 0.0, "above 0", dict[str, float]()
         for what in _NUMBERS[verdict]:
-            number = _number(own[columns[what]])
+            number = _number(trace[columns[what]])
             if not (least <= number < inf and number > 0):
-                _refuse(own, columns[what], f"a number {above}", where)
+                _refuse(trace, columns[what], f"a number {above}", where)
             least, above = number, f"of at least {number:g}, its {what}"
             numbers[what] = number
         value, low, high = map(numbers.get, ("value", "low", "high"))
         quantities[name] = verdict, value, low, high
-    words = {name: own[name] for name in own if name in copied}
-    return Told(own["trace"], own["fit"], words, quantities)
+    words = {name: trace[name] for name in trace if name in copied}
+    return Told(trace["trace"], trace["fit"], words, quantities)
 
 
-def _refuse(own: Mapping[str, str], column: str, allowed: str, where: str) -> NoReturn:
-    raise BiogripError(f"{where}, {column}: found '{own[column]}'; allowed is {allowed}.")
+def _refuse(trace: Mapping[str, str], column: str, allowed: str, where: str) -> NoReturn:
+    raise BiogripError(f"{where}, {column}: found '{trace[column]}'; allowed is {allowed}.")
 
 
 def _units(header: Sequence[str]) -> dict[str, str]:
     """Return quantities with their units; other columns, as a lone ``p value``, are the user's."""
-    found: dict[str, dict[str, str]] = {}
-    for name, what, unit in (it.groups("") for it in map(_OF_QUANTITY.fullmatch, header) if it):
-        found.setdefault(name, {})[what] = unit
-    return {name: max(of.values()) for name, of in found.items() if "verdict" in of or len(of) == 3}
+    parts = defaultdict[str, dict[str, str]](dict)
+    for column in filter(None, map(_OF_QUANTITY.fullmatch, header)):
+        name, what, unit = column.groups("")
+        parts[name][what] = unit
+    return {name: max(of.values()) for name, of in parts.items() if "verdict" in of or len(of) == 3}
 
 
 def _columns(name: str, unit: str) -> dict[str, str]:
@@ -208,164 +254,160 @@ def _is_used(trace: Mapping[str, str]) -> bool:
     return trace["fit"] != FAILED and (trace["fit"] != REJECTED or trace.get(LINEAR) == "yes")
 
 
-def _printed(
-    compared: Compared, names: Sequence[str], units: Mapping[str, str], unit: str | None
-) -> str:
+def _counts(grouped: _Grouped, cells: Sequence[Cell], found: Path) -> str:
+    counts = [counted(len(grouped.used), "trace"), counted(len(cells), "cell")]
+    units = len({(cell.group, cell.unit) for cell in cells})
+    counts += [f"{units} units ({grouped.unit})"] if grouped.unit else []
+    return f"{visible(found)}: {', '.join(counts)}, {100 * grouped.confidence:g} % limits"
+
+
+def _printed(compared: Compared, grouped: _Grouped) -> str:
     """Return a comparison as a table, but for quantities that no cell determines."""
-    rows = []
-    for (name, group), row in compared.items():
-        if not any(compared[name, each]["determined"] for each in names):
-            continue
-        mean, ratio, p = "too few", "", ""
-        if "low" in row:
-            mean = with_limits(row["median"], row["low"], row["high"])
-        elif "median" in row:
-            mean = plain(row["median"])
-        if "p" in row:
-            ratio = with_limits(row["ratio"], row["ratio_low"], row["ratio_high"])
-            p = f"{row['p']:.2g}"
-        elif unit and group != names[0] and "median" in row:
-            ratio = "cannot be told"
-        determined = [f"{row['determined']} of {row['cells']}"]
-        if unit:
-            scatters = [row.get("scatter_of_cells"), row.get("scatter_of_units")]
-            shown = ("?" if it is None else f"{plain(100 * it, 2)} %" for it in scatters)
-            determined += [str(row["units"]), ", ".join(shown)]
-        rows.append((with_unit(name, units[name]), group, *determined, mean, ratio, p))
-    of_units = [unit, f"scatter of cells, {unit}"] if unit else []
-    ratio_to = f"ratio to {names[0]}"
-    of_group = "geometric mean", ratio_to, "p"
+    named = {name for (name, _), row in compared.items() if row["determined"]}
+    rows = [
+        (with_unit(name, grouped.units[name]), group, *_shown(row))
+        for (name, group), row in compared.items()
+        if name in named
+    ]
+    of_units = [grouped.unit, f"scatter of cells, {grouped.unit}"] if grouped.unit else []
+    of_group = "geometric mean", f"ratio to {grouped.names[0]}", "p"
     return aligned(rows, ("quantity", "group", "determined in", *of_units, *of_group))
 
 
-def _left_out(
-    traces: Sequence[Mapping[str, str]],
-    made_by: Sequence[str],
-    cells: Sequence[Cell],
-    told: Sequence[Told],
-) -> Iterator[str]:
+def _shown(row: Mapping[str, Any]) -> Iterator[str]:
+    """Yield cells of a row of the printed table."""
+    yield f"{row['determined']} of {row['cells']}" + f", {row['bounded']} bounded" * (
+        row["bounded"] > 0
+    )
+    if "units" in row:
+        scatters = (row.get(f"scatter_of_{what}") for what in ("cells", "units"))
+        yield str(row["units"])
+        yield ", ".join("?" if it is None else f"{plain(100 * it, 2)} %" for it in scatters)
+    for what, low, high in (("median", "low", "high"), ("ratio", "ratio_low", "ratio_high")):
+        none = "too few" if what == "median" else ""
+        value = plain(row[what]) if what in row else none
+        yield with_limits(row[what], row[low], row[high]) if low in row else value
+    yield f"{row['p']:#.2g}" if "p" in row else "none" * ("no_p" in row)
+
+
+def _left_out(grouped: _Grouped, cells: Sequence[Cell]) -> Iterator[str]:
     """Say which traces are left out, and which are averaged."""
+    traces, made_by = grouped.traces, grouped.made_by
     for status, why in ((REJECTED, "the fit is rejected"), (FAILED, "not identified")):
         if names := [it["trace"] for it in traces if it["fit"] == status and not _is_used(it)]:
             yield f"Left out, {why}: {', '.join(names)}."
-    if names := [own["trace"] for own in traces if own["fit"] == REJECTED and _is_used(own)]:
+    if names := [it["trace"] for it in traces if it["fit"] == REJECTED and _is_used(it)]:
         yield f"Used only whatever the model, as their fits are rejected: {', '.join(names)}."
     for column in made_by:
-        if names := [own["trace"] for own in traces if not own[column]]:
+        if names := [it["trace"] for it in traces if not it[column]]:
             yield f"Left out, nothing under {column}: {', '.join(names)}."
     if several := [cell for cell in cells if len(cell.traces) > 1]:
         names = [f"{cell.name} ({len(cell.traces)})" for cell in several]
         yield f"Averages of several traces: {_few(names)}."
-        for column, nests in shared_columns(told, made_by[0]):
-            words = ({own.words[column] for own in cell.traces} for cell in several)
-            if column not in made_by and not nests and max(map(len, words)) > 1:
-                yield (
-                    f"These differ in {column}: if cells are numbered anew in each, "
-                    f"--unit {column} takes them for different ones."
-                )
 
 
-def _not_known(
-    cells: Sequence[Cell], compared: Compared, confidence: float, unit: str | None
-) -> Iterator[str]:
-    """Say which cells are in no mean, as they do not determine the quantity."""
-    for name in dict.fromkeys(name for name, _ in compared):
-        if any(row["determined"] for (own, _), row in compared.items() if own == name):
-            groups = [group for own, group in compared if own == name]
-            for group in groups:
-                these = [cell for cell in cells if cell.group == group]
-                yield from _of_group(name, group, these, confidence, unit)
-        else:
-            every = [it for it in cells if it.others.get(name, ("",))[0] not in ("", FIT_REJECTED)]
-            said = "; ".join(_bounds(name, every, 0)) or "nothing is told by any"
-            if every:
-                yield f"{name} is determined in none of {counted(len(every), 'cell')}: {said}."
+def _not_determined(cells: Sequence[Cell], compared: Compared) -> Iterator[str]:
+    """Say which cells do not determine a quantity; of one that none does, only that."""
+    determined = {name for (name, _), row in compared.items() if row["determined"]}
+    for name, group in compared:
+        told = [it for it in cells if it.group == group and name in it.others]
+        told = [it for it in told if not it.rejects(name)]
+        if bounds := "; ".join(_bounds(name, told)):
+            counts = ", which count as bounds" if name in determined else ""
+            yield f"{name} of {group}: {bounds}{counts}."
+        if names := [it.name for it in told if it.others[name][0] not in _ONE_SIDED]:
+            yield f"{name} of {group}: nothing is told by {_few(names)}."
 
 
-def _bounds(name: str, cells: Sequence[Cell], most: int) -> Iterator[str]:
-    """Say how many cells bound a quantity, and by what; of few by name."""
-    for verdict, (words, _) in _ONE_SIDED.items():
-        some = [cell for cell in cells if cell.others.get(name, ("",))[0] == verdict]
-        ends = sorted(end for cell in some if (end := cell.others[name][1]))
-        if some and len(some) <= most:
-            named = (f"{cell.name} ({words} {plain(cell.others[name][1] or 0)})" for cell in some)
-            yield f"in {', '.join(named)}"
-        elif some:
+def _bounds(name: str, cells: Sequence[Cell]) -> Iterator[str]:
+    """Say how many cells bound a quantity, and by what."""
+    for verdict, words in _ONE_SIDED.items():
+        if ends := sorted(it.others[name][1] or 0 for it in cells if it.others[name][0] == verdict):
             reach = " to ".join(dict.fromkeys(plain(end) for end in (ends[0], ends[-1])))
-            yield f"{verdict} in {len(some)} ({words} {reach})"
+            yield f"{verdict} in {len(ends)} ({words} {reach})"
 
 
-def _of_group(
-    name: str, group: str, cells: Sequence[Cell], confidence: float, unit: str | None
-) -> Iterator[str]:
-    """Say what cells of a group leave open, and what mean bounds would give as values."""
-    for verdict, (_, moved) in _ONE_SIDED.items():
-        own = [cell for cell in cells if cell.others.get(name, ("",))[0] == verdict]
-        for said in _bounds(name, own, _FEW):
-            placed = at_bounds(cells, name, verdict)
-            row = compare(placed, [group], confidence, units=unit is not None)[name, group]
-            what = f"{name} of {group}: only bounded {said.removeprefix(verdict).strip()}, so in no"
-            moves = f"that of all cells is {moved}"
-            if "median" in row:
-                moves = f"with them at these bounds it is {plain(row['median'])}, {moves}"
-            yield f"{what} mean; {moves}."
-    told = {*_ONE_SIDED, FIT_REJECTED}
-    if some := [it.name for it in cells if name in it.others and it.others[name][0] not in told]:
-        yield f"{name} of {group}: nothing is told by {_few(some)}."
+def _pairs(cells: Sequence[Cell], compared: Compared, grouped: _Grouped) -> Iterator[str]:
+    """Say which units are in a group and in the first, and what follows."""
+    first, *others = grouped.names
+    of = {name: {it.unit for it in cells if it.group == name and it.unit} for name in grouped.names}
+    for group in others:
+        paired = any(row.get("pairs") for (_, name), row in compared.items() if name == group)
+        if both := sorted(of[first] & of[group]):
+            left = sorted(of[first] ^ of[group]) if paired else both
+            follows = "are pairs, of which ratio and p are (paired t test)"
+            follows = follows if paired else "are fewer than those of one group alone"
+            yield (
+                f"{grouped.unit} in {first} and {group}: {_few(both)}. These {follows}"
+                + f"; left out of ratio and p: {_few(left)}" * bool(left)
+                + ". If a name means another one in each group, name them apart."
+            )
 
 
-def _not_paired(cells: Sequence[Cell], unit: str | None) -> Iterator[str]:
-    """Say which units stand in several groups."""
-    groups = Counter(name for name, _ in {(cell.unit, cell.group) for cell in cells})
-    if unit and (both := sorted(name for name, count in groups.items() if count > 1)):
-        several = ", ".join(both) if len(both) <= _FEW else f"{len(both)} of {unit}"
-        yield f"In several groups: {several}. Each counts there as another one; nothing is paired."
+def _without_p(compared: Compared) -> Iterator[str]:
+    """Say why there is no p."""
+    reasons = defaultdict[tuple[str, str], list[str]](list)
+    for (name, group), row in compared.items():
+        if "no_p" in row:
+            reasons[group, row["no_p"]].append(name)
+    for (group, why), names in reasons.items():
+        yield f"No p for {', '.join(names)} of {group}: {why}."
 
 
-def _shared(
-    told: Sequence[Told], by: str, names: Sequence[str], confidence: float, compared: Compared
-) -> Iterator[str]:
-    """Say what columns that cells share would change as units."""
-    for column, _ in shared_columns(told, by):
-        cells = gather(told, by, column, confidence)
-        again = compare(cells, names, confidence, units=True)
-        ps = [
-            f"{row['p']:.2g} for {name}{f' of {group}' if names[2:] else ''} (here {here})"
-            for (name, group), row in again.items()
-            if "p" in row
-            and (here := f"{own['p']:.2g}" if "p" in (own := compared[name, group]) else "none")
-        ]
+def _shared(grouped: _Grouped) -> Iterator[str]:
+    """Say which columns may be those of units."""
+    for column, _ in shared_columns(grouped.told, grouped.by):
+        cells = grouped.gathered(column)
         units = len({(cell.group, cell.unit) for cell in cells})
-        then = f"p is {', '.join(ps)}" if ps else "whether groups differ cannot be told"
         yield (
             f"Column {column} puts {len(cells)} cells into {units} units. If these are what was "
-            f"repeated, cells are not independent: with --unit {column} {then}."
+            f"repeated, cells are not independent, and p is that of --unit {column}."
         )
 
 
-def _tests(cells: Sequence[Cell], names: Sequence[str], by: str, unit: str | None) -> Iterator[str]:
-    """Yield sentences for a paper on what was compared, and how."""
+def _without_doubtful(grouped: _Grouped, cells: Sequence[Cell]) -> Iterator[str]:
+    if doubtful := [cell.name for cell in cells if cell.doubtful]:
+        yield f"Without the doubtful {_few(doubtful)}:"
+        yield _printed(grouped.compared([cell for cell in cells if not cell.doubtful]), grouped)
+
+
+def _for_a_paper(grouped: _Grouped, cells: Sequence[Cell], compared: Compared) -> str:
+    """Return a paragraph on how traces were identified, and groups compared."""
+    made = (in_sentences(trace[METHODS]) for trace in grouped.used if trace.get(METHODS))
+    outcome = (
+        (it["trace"], it["fit"], it.get(REASONS) or it.get(FAILED, "")) for it in grouped.traces
+    )
+    version = max(trace.get(WRITTEN_BY, "") for trace in grouped.used) or __version__
+    tests = _tests(grouped, cells, [*compared.values()])
+    return paragraph([*together(made), *outcome_in_words(outcome), *tests], version)
+
+
+def _tests(
+    grouped: _Grouped, cells: Sequence[Cell], rows: Sequence[Mapping[str, Any]]
+) -> Iterator[str]:
+    """Yield sentences on what was compared, and how."""
     counts = []
-    for group in names:
-        own = [cell for cell in cells if cell.group == group]
-        of = f" in {counted(len({cell.unit for cell in own}), 'unit')}" if unit else ""
-        counts.append(f"{group} {counted(len(own), 'cell')}{of}")
-    yield f"Groups are those of {by}: {'; '.join(counts)}."
-    if unit:
+    for group in grouped.names:
+        units = [cell.unit for cell in cells if cell.group == group]
+        of = f" in {counted(len({*units}), 'unit')}" if grouped.unit else ""
+        counts.append(f"{group} {counted(len(units), 'cell')}{of}")
+    yield f"Groups are those of {grouped.by}: {'; '.join(counts)}."
+    unit = "Cells are taken for independent, and weigh in geometric means"
+    if grouped.unit:
+        unit = f"The unit is the {grouped.unit}, cells weigh in its geometric mean"
+    yield f"{unit} by their scatter and errors (DerSimonian and Laird 1986); limits are Student's."
+    if any(row["bounded"] for row in rows):
         yield (
-            f"The unit is the {unit}: geometric means are those of the units' geometric means, "
-            "with limits of Student's t, and ratios are compared by Welch's t test (Lord et al., "
-            "Journal of Cell Biology 219 (2020), e202001064)."
+            "Cells that are only bounded count by Tobin's likelihood (1958), with errors by the "
+            "jackknife, and the larger p of two readings of bounds is given."
         )
-    else:
-        yield (
-            "Cells are taken for independent: geometric means have random effects "
-            "(DerSimonian and Laird 1986) and limits after Hartung and Knapp, and ratios are "
-            "compared by Welch's t test."
-        )
-    if names[2:]:
-        yield f"Groups are compared with {names[0]}, and p values are adjusted after Holm (1979)."
+    tests = {bool(row["pairs"]) for row in rows if "p" in row}
+    named = "Welch's t test", f"the paired t test of each {grouped.unit} that is in both groups"
+    if tests:
+        yield f"Ratios are compared by {' or '.join(named[it] for it in sorted(tests))}."
+    if grouped.names[2:]:
+        yield f"Groups are compared with {grouped.names[0]}, p values adjusted after Holm (1979)."
 
 
 def _few(names: Sequence[str]) -> str:
-    return ", ".join(names) if len(names) <= _FEW else f"{len(names)} cells"
+    return ", ".join(names) if len(names) <= _FEW else f"{len(names)} of them"

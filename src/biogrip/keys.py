@@ -8,7 +8,7 @@ registry (`OneOf`), lists without twins (`Distinct`), and what is wrong with key
 """
 
 import json
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Annotated, Any, ClassVar, Self, TypeVar
@@ -27,7 +27,12 @@ from pydantic import (
 from pydantic_core import CoreSchema, PydanticCustomError, ValidationError
 from pydantic_core.core_schema import literal_schema
 
+from biogrip.errors import nearest
+
 T = TypeVar("T")
+
+# Most names that a complaint lists.
+_NAMES_LISTED = 6
 
 Complaint = tuple[tuple[Hashable, ...], str]
 """Path of a key, relative to its block, and a message: what was found and what is allowed."""
@@ -75,6 +80,16 @@ BY_KIND = Discriminator(kind_of)
 """Annotation of alternatives, each with its kind as `Tag`."""
 
 
+def unknown_names(
+    path: tuple[str, ...], names: Iterable[str], allowed: Collection[str]
+) -> Iterator[Complaint]:
+    """Find names in a list that are not among those allowed, of which the first few are said."""
+    for index, name in enumerate(names):
+        if name not in allowed:
+            text = f"found '{name}', allowed are {', '.join([*allowed][:_NAMES_LISTED])}."
+            yield (*path, index), text + nearest(name, allowed)
+
+
 class Checked:
     """Base class of models that find conflicts between their keys, where the context is true."""
 
@@ -84,12 +99,12 @@ class Checked:
 
     @model_validator(mode="after")
     def _refuse_conflicts(self, info: ValidationInfo) -> Self:
-        found: list[Any] = [
+        conflicts: list[Any] = [
             {"type": PydanticCustomError(CONFLICT, text), "loc": path, "input": None}
             for path, text in (self.complaints() if info.context else ())
         ]
-        if found:
-            raise ValidationError.from_exception_data(CONFLICT, found)
+        if conflicts:
+            raise ValidationError.from_exception_data(CONFLICT, conflicts)
         return self
 
 

@@ -80,10 +80,6 @@ PERIODS, EVEN = 10, 0.01
 """Fewest periods of a line, as what is slower may be misfit, and the largest difference of
 intervals, as a share, with which it has a spectrum. Chosen."""
 
-JUMP, GAIN, BRANCH = 0.2, 0.2, 0.5
-"""Largest errors that a trace may well hide: a fifth of the peak, or of the readings; half of the
-stiffness of the first branch. Chosen."""
-
 # The start of a protocol.
 
 SURELY, AS_GOOD = 1e-9, 1e-3
@@ -111,8 +107,14 @@ which their growth is known, and its powers of the time if someone spaced them. 
 HELD = 0.1
 """Change of a recorded load, as a share of it, that is held. Chosen."""
 
-SHORT_RAMP = 0.1
-"""Share of the trace up to which a ramp before it may pass for a step. Chosen."""
+SAME_SHARE = 0.02
+"""Difference of standard deviations, over the readings, that may be rounding. Chosen."""
+
+NO_LOAD = 0.01
+"""Share of the largest load up to which rows tell the zero: they show hardly more of it. Chosen."""
+
+FEWEST_STILL = 8
+"""Rows of a record from which on a trend is told: of fewer, an arc at a sine's crest is none."""
 
 WHITE = 1.5
 """Misfit over the scatter of neighbours that a right fit does not exceed. Chosen, above `TOO_MUCH`:
@@ -207,3 +209,16 @@ right sweeps is refused."""
 
 FAR_ABOVE = 10.0
 """Multiple of a given noise from which a rotation is seen, however small it is."""
+
+# Rows of several conditions, and the noise of a sweep.
+
+CONDITIONS = 1e-3
+"""Level at which readings of equal times or frequencies are no repeats: of a thousand files with
+repeats one is taken for several conditions."""
+
+MEASURED_ALIKE = 0.01
+"""Share by which numbers of one condition scatter, as 19.9 and 20.1 for 20. Chosen."""
+
+LIKELIER = 6.0
+"""Deviance by which shares of each modulus are clearly likelier than an amplitude and a phase: by
+chance once in a hundred sweeps with the noise of these."""

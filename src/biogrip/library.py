@@ -20,7 +20,7 @@ from biogrip.command.outputs import Outcome, table_of
 from biogrip.command.settings import MODEL, Asked, read_trace
 from biogrip.command.words import in_words
 from biogrip.config.loading import default_ranges
-from biogrip.config.source import HOLD
+from biogrip.config.source import HOLD, RAMP
 from biogrip.errors import BiogripError
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import identify_many
@@ -50,6 +50,7 @@ one_blas_thread: Callable[[_Function], _Function] = threadpool_limits.wrap(
 _ARGUMENTS = (
     ("--reading loss=COLUMN", "loss=..."),
     ("--start fit", 'start="fit"'),
+    ("--ramp DURATION", "ramp=..."),
     ("--offset --drift", "offset=True, drift=True"),
     ("--(offset|drift)", r"\1=True"),
     (r"--model (\w+)", r'model="\1"'),
@@ -110,9 +111,9 @@ class TraceResult:
         """
         import pandas as pd
 
-        found = self.diagnosis.without_model(at)
+        level = self.diagnosis.without_model(at)
         columns = ["quantity", "at_s", "unit", "value", "low", "high"]
-        frame = pd.DataFrame(found.told)[columns]
+        frame = pd.DataFrame(level.told)[columns]
         return frame.astype(dict.fromkeys(["at_s", "value", "low", "high"], float))
 
     def refit(self, **changed: Any) -> "TraceResult":
@@ -148,6 +149,7 @@ def identify_trace(
     reads: str = GRIPPER.read.name,
     model: str = MODEL,
     hold: float | str | None = None,
+    ramp: float | None = None,
     start: float | str | None = None,
     sd: ArrayLike | None = None,
     loss: ArrayLike | None = None,
@@ -174,6 +176,8 @@ def identify_trace(
     hold
         What is held from 0 to the end, in SI units or with its unit, as ``"20 pN"``, unless
         ``config`` has the protocol.
+    ramp
+        Time in s within which it was reached, linearly and from its start on; by default at once.
     start
         Start of the protocol on the clock of `time_s`, in s, or ``"fit"``.
     sd : (n_samples,), optional
@@ -200,7 +204,7 @@ def identify_trace(
     """
     arguments = locals()
     for name, block in (("fixed", fixed or {}), ("config", config or {})):
-        if not isinstance(block, Mapping) or not all(isinstance(it, str) for it in block):
+        if not isinstance(block, Mapping) or not all(isinstance(value, str) for value in block):
             raise BiogripError(f"{name}: found {block!r:.40}, allowed are values by name.")
     if not isinstance(reads, str) or reads not in INSTRUMENTS:
         raise BiogripError(f"reads: found '{reads}', allowed are {', '.join(INSTRUMENTS)}.")
@@ -208,16 +212,19 @@ def identify_trace(
     axis = "omega_rad_per_s" if INSTRUMENTS[reads].sweeps else "time_s"
     beside = f"loss in {INSTRUMENTS[reads].read.unit}"
     more = {beside: loss, "sd": sd}
-    given = {axis: time_s, column: readings} | {n: it for n, it in more.items() if it is not None}
+    given = {axis: time_s, column: readings} | {
+        n: value for n, value in more.items() if value is not None
+    }
     columns = {name: as_column(values, name) for name, values in given.items()}
     if len({len(values) for values in columns.values()}) > 1:
-        found = " and ".join(f"{len(values)} of {name}" for name, values in columns.items())
-        raise BiogripError(f"found {found}; allowed are as many of each.")
+        lengths = " and ".join(f"{len(values)} of {name}" for name, values in columns.items())
+        raise BiogripError(f"found {lengths}; allowed are as many of each.")
     onset = ("fit_start", True) if isinstance(start, str) and start == "fit" else ("start_s", start)
     chosen: list[tuple[str, str, Any]] = [
         *(("config", block, value) for block, value in (config or {}).items()),
         ("model", "sample.model", model),
         ("hold", *HOLD, hold),
+        ("ramp", *RAMP, ramp),
         ("reads", f"measurement.{reads}", column),
         ("loss", "measurement.loss", None if loss is None else beside),
         ("start", f"measurement.{onset[0]}", onset[1]),
@@ -229,7 +236,9 @@ def identify_trace(
         ("drift", "measurement.drift", drift),
         ("fixed", "fixed", fixed and {**fixed}),
     ]
-    settings = [Setting(by, tuple(key.split(".")), it) for by, key, it in chosen if it is not None]
+    settings = [
+        Setting(by, tuple(key.split(".")), value) for by, key, value in chosen if value is not None
+    ]
     asked = Asked(Path("trace"), None, tuple(settings), "arguments", arrays=(*columns.values(),))
     try:
         recording, case = read_trace(asked)
@@ -253,10 +262,10 @@ def to_table(
 
     named = results
     if not isinstance(named, Mapping):
-        named = {str(number): own for number, own in enumerate(named, start=1)}
-    found = [{**own.data, "trace": name} for name, own in named.items()]
+        named = {str(number): result for number, result in enumerate(named, start=1)}
+    outcomes = [{**result.data, "trace": name} for name, result in named.items()]
     copied = {name: (words or {}).get(name, {}) for name in named}
-    header, rows = table_of(Outcome(found, {}, copied=copied))
+    header, rows = table_of(Outcome(outcomes, {}, copied=copied))
     return pd.DataFrame(rows, columns=header)
 
 

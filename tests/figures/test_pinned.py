@@ -1,7 +1,5 @@
 """Every figure of a small study is what ``make pinned`` has kept here: look at what changes."""
 
-from io import BytesIO
-from itertools import product as all_pairs
 from pathlib import Path
 from typing import Any
 
@@ -10,11 +8,6 @@ import numpy as np
 import pytest
 from PIL import Image
 from scipy.spatial import KDTree
-
-from biogrip.figures.style import save_png, styled
-from biogrip_study.figures.overview import draw_robustness
-from biogrip_study.tables.sweeps import POINTS
-from tests.helpers.default import study_of
 
 PINNED = Path(__file__).with_name("pinned")
 # Size as a share of what is drawn, and colours, in which a line is still a line.
@@ -25,33 +18,6 @@ TOLERANCE = 0.2
 # Text is set differently by another minor version of Matplotlib, which brings another FreeType.
 VERSION = ".".join(mpl.__version__.split(".")[:2])
 VERSION_FILE = PINNED / "matplotlib-version"
-SWEEP = """
-methods: [genetic, least_squares]
-sweeps:
-  level:
-    title: Level and rate
-    cases: [endothelial_cell, liquid_drop_1, liquid_drop_2]
-    rows: {label: level, unit: "%", unit_in_si: 0.01, key: measurement.noise.level,
-           values: [0, 0.05, 0.2]}
-    columns: {label: rate, unit: Hz, key: measurement.rate_Hz, values: [0.1, 10]}
-"""
-
-
-def judged(folder: Path) -> Path:
-    """Points of a sweep, of all sizes of numbers and without a bound here and there."""
-    sweep = study_of(SWEEP).config.sweeps["level"]
-    grid = all_pairs(sweep.rows.levels, sweep.columns.levels)
-    quantities = ("k", "k_p", "c", "c_p", "c + c_p")
-    axes: Any = map(enumerate, (sweep.cases, grid, ("genetic", "least_squares"), quantities))
-    rows = []
-    for (n, case), (i, (row, column)), (j, method), (q, quantity) in all_pairs(*axes):
-        share, error = ((3 * i + 2 * j + n) % 11) / 10, 0.004 * 7.0 ** (i + q)
-        bound = np.nan if row.shown == "0" else error * 2.0 ** (i - 3)
-        levels = (row.shown, column.shown, method, quantity)
-        values = (20, share, share / 2, error, error / 2, bound)
-        rows.append((f"{case}--level--{i}", *levels, *values))
-    POINTS.write(folder / "level.csv", rows)
-    return folder / "level.csv"
 
 
 def reduced(file: Any) -> Image.Image:
@@ -85,11 +51,8 @@ def test_no_figure_changed(tiny: Path, tmp_path: Path, request: pytest.FixtureRe
     pinning = request.config.getoption("--pin")
     if not pinning and VERSION_FILE.read_text().strip() != VERSION:
         pytest.skip(f"pictures are pinned with Matplotlib {VERSION_FILE.read_text().strip()}")
-    with styled():
-        save_png(draw_robustness(study_of(SWEEP), "level", judged(tmp_path)), drawn := BytesIO())
     files = {path.stem: path for path in (tiny / "results" / "figures").glob("*.png")}
     pictures = {name: reduced(it) for name, it in files.items() if not name.endswith("_mine")}
-    pictures["robustness_level"] = reduced(drawn)
     if pinning:
         VERSION_FILE.write_text(f"{VERSION}\n")
         for path in PINNED.glob("*.png"):

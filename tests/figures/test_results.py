@@ -7,20 +7,19 @@ import pytest
 from matplotlib.patches import Rectangle
 
 from biogrip.figures import style
-from biogrip.figures.fit import Fit, draw_fit, scale_of
+from biogrip.figures.fit import FittedTrace, draw_fit, scale_of
 from biogrip.figures.likelihood import draw_profile
 from biogrip.figures.style import figure, save, styled
 from biogrip.physics.instruments import MODULUS
-from biogrip.physics.models import MODELS, Sample
+from biogrip.physics.models import MODELS
 from biogrip.records import write_object
 from biogrip_study.figures.case_fit import draw_fits
-from biogrip_study.figures.case_likelihood import draw_valley
 from biogrip_study.figures.course import draw_convergence, draw_scatter
 from biogrip_study.methods.registry import METHODS
 from biogrip_study.records.rows import write_arrays
 from biogrip_study.records.traces import Measurements, write_measurements
 from biogrip_study.stages import targets
-from tests.helpers.default import STUDY, seen, study_of
+from tests.helpers.default import STUDY, study_of
 from tests.helpers.problems import rotation
 from workflow.paper.gripper import draw_torque
 
@@ -74,7 +73,7 @@ def test_axes_suit_the_sampling_and_residuals_are_in_the_unit_that_was_minimised
         (dense, np.full(200, 0.5), "linear", " / sd"),
     ):
         modulus = 100 / (1 + time_s)
-        fit = Fit(time_s, None, 1.01 * modulus, modulus, sd, MODULUS)
+        fit = FittedTrace(time_s, None, 1.01 * modulus, modulus, sd, MODULUS)
         traces, residuals = draw_fit({"fit": fit}, "").axes
         assert (traces.get_xscale(), traces.get_yscale()) == (scale, scale)
         assert traces.get_ylabel() == "modulus (Pa)"
@@ -104,7 +103,7 @@ def test_no_more_seeds_are_drawn_than_can_be_seen(tmp_path: Path) -> None:
 def scattered(overlay: str, identifications: Path) -> Any:
     """Of a case of which the sum alone is determined."""
     folder, case = identifications.parent, study_of(f"{FEW}{overlay}").cases[CASE]
-    targets.simulate(case, folder / "target.csv")
+    targets.simulate_target(case, folder / "target.csv")
     verdicts = dict.fromkeys(["k", "k_p", "c", "c_p"], "not determined")
     verdicts["c + c_p"] = "determined"
     items = [{"quantity": name, "verdict": verdict} for name, verdict in verdicts.items()]
@@ -139,53 +138,6 @@ def test_a_set_in_two_parts_is_shaded_in_two_parts() -> None:
     assert edges == [(1.2, 1.9), (2.1, pytest.approx(3.3))]
 
 
-def drawn_valley(
-    folder: Path, increases: list[list[float]], fits: dict[str, list[float]], **known: Any
-) -> Any:
-    """Axes of a valley along the sum of 10, with sums of 9, 10 and 11."""
-    shares = np.linspace(0.1, 0.9, 5)
-    sums = 10 * np.array([[0.9], [1.0], [1.1]])
-    grid = {"x_values": sums * shares, "y_values": sums * (1 - shares), "increases": increases}
-    axis = {"name": "c", "symbol": "$c$", "unit": "N s/m"}
-    other = {**axis, "name": "c_p", "symbol": "$c_p$"}
-    grids = [{key: np.asarray(each).tolist() for key, each in grid.items()}]
-    path, valley = folder / "v.json", {"x": axis, "y": other, "grids": grids, "best": [9.0, 1.0]}
-    write_object(path, {"valley": valley})
-    ends: dict[str, Any] = {f"{name}_Ns_per_m": values for name, values in fits.items()}
-    found = identified(folder, "least_squares", **ends)
-    study = seen(fitting_method=METHODS["least_squares"], config=seen(methods=["least_squares"]))
-    known |= {"name": "x", "seeds": len(fits["c"]), "sample": Sample(MODEL.name), "study": study}
-    paper = seen(identified=known.get("paper", {}))
-    case = seen(title="A drop", parameters=known.get("truth", {}), published=paper, **known)
-    with styled():
-        return draw_valley(case, path, found).axes[0]
-
-
-DEEP = [[50.0] * 5, [0.0] * 5, [60.0] * 5]
-# Deep at its last point alone, where c is 9.
-CLOSED = [[900.0] * 5, [900.0, 900.0, 900.0, 900.0, 0.0], [900.0] * 5]
-
-
-def test_a_valleys_axes_end_around_what_is_in_it(tmp_path: Path) -> None:
-    """Fits, truth, paper and where it is deep; each of them widens the axes, none is cut off."""
-    near = {"c": [8.9, 9.05], "c_p": [1.1, 0.95]}
-    narrow = drawn_valley(tmp_path, CLOSED, near)
-    # The root of the rise, 30 at the next point, (7, 3), is below that of 10.83 for 0.11 of the way
-    # there, which is as far as (8.78, 1.22); the fits end at (9.05, 0.95).
-    low, high = narrow.get_xlim()
-    assert 8.5 < low < 8.78 < 9.05 < high < 9.3
-    low, high = narrow.get_ylim()
-    assert 0.7 < low < 0.95 < 1.22 < high < 1.5
-    low, high = drawn_valley(tmp_path, DEEP, near).get_xlim()
-    assert low < 1 < 9 < high
-    known = {"c": 6.0, "c_p": 4.0}
-    more = drawn_valley(tmp_path, CLOSED, {"c": [6.0, 9.05], "c_p": [4.0, 0.95]})
-    true, published = {"truth": known}, {"paper": known}
-    for axes in (more, *(drawn_valley(tmp_path, CLOSED, near, **it) for it in (true, published))):
-        assert axes.get_xlim()[0] < 6 < 9.05 < axes.get_xlim()[1]
-        assert axes.get_ylim()[0] < 0.95 < 4 < axes.get_ylim()[1]
-
-
 def test_a_figure_for_print_has_fonts_that_publishers_take(tmp_path: Path) -> None:
     with styled():
         save(draw_torque(STUDY), tmp_path / "torque.png", tmp_path / "torque.pdf")
@@ -200,7 +152,7 @@ def test_prefixes_dollars_and_methods() -> None:
     assert {value: scale_of(np.array([-value, 0.0]), "rad") for value in scales} == scales
     assert style.literal("5$ a day") == r"5\$ a day"
     assert len({it.color for it in METHODS.values()}) == len(METHODS)
-    assert [it.dashes for it in METHODS.values()] == ["-", "-", "--", "-."]
+    assert [it.dashes for it in METHODS.values()] == ["-", "--"]
 
 
 def test_points_beyond_an_axis_are_triangles_at_its_edge() -> None:

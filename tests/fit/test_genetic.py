@@ -12,7 +12,7 @@ from biogrip.fit.problem import Fit, History, TraceProblem
 from biogrip.fit.search_range import GeneRange
 from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.sample_model import with_fixed
-from biogrip_study.methods import genetic, genetic_refined
+from biogrip_study.methods import genetic
 from biogrip_study.methods.genetic import GeneticSettings, select
 from biogrip_study.methods.genome import (
     Genome,
@@ -24,20 +24,21 @@ from biogrip_study.methods.genome import (
 from biogrip_study.methods.misfit import make_misfit
 from tests.helpers.problems import clean, pose_noisy
 
-SMALL = GeneticSettings(60, 30, "pairs", 1, -1, 3, 0.5, 1, 4, 6, 25)
+SMALL = GeneticSettings(60, 30, "pairs", "once", 3, 0.5, 1, 4, 6, 25)
 READINGS = {
     "as printed": SMALL,
     "rank": replace(SMALL, mating="rank"),
     "several genes": replace(SMALL, mutated_genes=3, mutation_probability=0.9),
     "survivors, too": replace(SMALL, mutants="all"),
     "no mutation": replace(SMALL, mutation_probability=0.0),
-    "odd": replace(SMALL, population=41, survivors=7, first_cut=3, last_cut=3),
-    "cut beyond the last gene": replace(SMALL, first_cut=50, last_cut=50),
+    "odd": replace(SMALL, population=41, survivors=7),
+    "cut between parameters": replace(SMALL, cut="between"),
+    "cut in each parameter": replace(SMALL, cut="each"),
     "few": replace(SMALL, population=9, survivors=8, min_generations=0, max_generations=40),
     "limit": replace(SMALL, max_generations=5),
     "no generation": replace(SMALL, min_generations=0, max_generations=0),
     "misfits of their own": replace(SMALL, population=10, survivors=5, max_generations=7),
-    "the paper's population": GeneticSettings(500, 250, "pairs", 1, -1, 20, 0.5, 1, 5, 10, 200),
+    "the paper's population": GeneticSettings(500, 250, "pairs", "once", 20, 0.5, 1, 5, 10, 200),
 }
 MAXWELL = MODELS["generalized_maxwell"]
 MODELS_SEARCHED = {
@@ -102,7 +103,7 @@ def gene_by_gene(posed: TraceProblem, settings: GeneticSettings, rng: np.random.
         if generation == settings.max_generations or not waits:
             break
         generation += 1
-        children = crossed(survivors, settings, rng)
+        children = crossed(survivors, genome.sizes, settings, rng)
         if generation >= settings.mutation_start:
             children = mutated(children)
             if settings.mutants == "all":
@@ -119,7 +120,9 @@ def gene_by_gene(posed: TraceProblem, settings: GeneticSettings, rng: np.random.
     return Fit(best, float(lowest[-1]), generation, evaluations, ended, history)
 
 
-def crossed(parents: IntArray, settings: GeneticSettings, rng: np.random.Generator) -> IntArray:
+def crossed(
+    parents: IntArray, sizes: Any, settings: GeneticSettings, rng: np.random.Generator
+) -> IntArray:
     wanted, (count, genes) = settings.population - settings.survivors, parents.shape
     pairs = -(-wanted // 2)
     if settings.mating == "rank":
@@ -129,14 +132,24 @@ def crossed(parents: IntArray, settings: GeneticSettings, rng: np.random.Generat
         even = count // 2 * 2
         rounds = [rng.permutation(count)[:even] for _ in range(-(-2 * pairs // even))]
         drawn = np.concatenate(rounds)[: 2 * pairs].reshape(pairs, 2)
-    first, last = (
-        min(cut if cut > 0 else genes + cut, genes - 1)
-        for cut in (settings.first_cut, settings.last_cut)
-    )
-    cuts = rng.integers(min(first, last), last, size=pairs, endpoint=True)
-    both = zip(np.vstack((drawn, drawn[:, ::-1])), np.tile(cuts, 2), strict=True)
-    heads = [np.append(parents[one][:cut], parents[other][cut:]) for (one, other), cut in both]
-    return np.array(heads)[:wanted]
+    starts = np.cumsum([0, *sizes])
+    if settings.cut == "each":
+        cuts = rng.integers(0, sizes, size=(pairs, len(sizes)), endpoint=True)
+    elif settings.cut == "between":
+        cuts = rng.choice(starts[1:-1], size=(pairs, 1))
+    else:
+        cuts = rng.integers(1, genes - 1, size=(pairs, 1), endpoint=True)
+    both = zip(np.vstack((drawn, drawn[:, ::-1])), np.vstack((cuts, cuts)), strict=True)
+    children = []
+    for (one, other), cut in both:
+        child = parents[other].copy()
+        if settings.cut == "each":
+            for start, own in zip(starts[:-1], cut, strict=True):
+                child[start : start + own] = parents[one][start : start + own]
+        else:
+            child[: cut[0]] = parents[one][: cut[0]]
+        children.append(child)
+    return np.array(children)[:wanted]
 
 
 def posed(count: int, model: Any = MAXWELL, **assumed: Any) -> list[TraceProblem]:
@@ -169,14 +182,6 @@ def test_populations_are_what_they_are_alone_and_gene_by_gene(name: str) -> None
         rngs = [rng_of(seed) for seed in group]
         found = genetic.identify_many([problems[seed] for seed in group], settings, rngs)
         assert [content(answer) for answer in found] == [plain[seed] for seed in group]
-
-
-def test_polished_populations_are_as_if_alone() -> None:
-    settings = replace(SMALL, max_generations=8), genetic_refined.Polishing(2, 1)
-    problems, polished = posed(2), genetic_refined.identify_many
-    alone = [polished([p], settings, [rng_of(s)])[0] for s, p in enumerate(problems)]
-    found = polished(problems, settings, [rng_of(0), rng_of(1)])
-    assert [content(answer) for answer in found] == [content(answer) for answer in alone]
 
 
 def test_genes_are_drawn_uniformly_from_their_whole_range() -> None:
@@ -251,3 +256,22 @@ def test_the_first_digit_is_searched_with_the_second_kept(digit: int) -> None:
         return 1.0 + abs(first - 7) + 10 * (second != 4)
 
     assert lowest_encodable(rungs, [GeneRange((2, 2), (digit, 9), 2)], np.array([[24.0]])) == 1
+
+
+@pytest.mark.parametrize("gray", [False, True])
+def test_bits_are_equal_steps_of_the_logarithm(gray: bool) -> None:
+    """Of 1.1e-4 to 9.9e7 in 2^4 - 1 steps; by Gray's code, n ^ (n >> 1), neighbours differ in one
+    bit."""
+    genes = GeneRange((-3, 8), (1, 9), bits=4, gray=gray)
+    numbers = np.arange(16)
+    written = numbers ^ (numbers >> 1) if gray else numbers
+    chromosomes = written[:, None] >> np.arange(4)[::-1] & 1
+    genome = make_genome([genes])
+    assert (genome.low.tolist(), genome.high.tolist()) == ([0] * 4, [1] * 4)
+    found = genome.decode(chromosomes)[:, 0]
+    np.testing.assert_allclose(found, np.geomspace(1.1e-4, 9.9e7, 16), rtol=1e-12)
+    np.testing.assert_array_equal(found, encodable_values(genes))
+    mixed = make_genome([(RANGES | {"c": genes})[p.range_name] for p in MAXWELL.parameters])
+    assert mixed.sizes == (3, 3, 4, 3)
+    rows = np.array([[1, 9, 5, 2, 1, 2, *chromosomes[5], -2, 1, 1]])
+    np.testing.assert_allclose(mixed.decode(rows)[0], [9.5, 12, found[5], 0.0011], rtol=1e-12)

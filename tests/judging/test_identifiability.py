@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.judging.diagnosis import Diagnosis, _pulling, _ringing, _with_valley, diagnose
+from biogrip.judging.diagnosis import Diagnosis, _pulling, _ringing, diagnose
 from biogrip.judging.likelihood import (
     Likelihood,
     check_rows,
@@ -17,7 +17,6 @@ from biogrip.judging.likelihood import (
     least_sd,
     make_likelihood,
 )
-from biogrip.judging.profiles import _increases, compute_valley
 from biogrip.judging.quantities import characteristic_times, find_combinations, parameters_and_sum
 from biogrip.judging.verdicts import BOUNDED_ABOVE, DETERMINED, NOT_DETERMINED
 from biogrip.physics.models import CANDIDATES, MODELS, Sample
@@ -115,37 +114,6 @@ def test_elements_of_spring_and_damper_have_a_time() -> None:
         own = {each.label: "/".join(model.names[it] for it in each.members) for each in times}
         assert own == found
         assert all(each.log(logs) == logs[list(each.members)] @ [1, -1] for each in times)
-
-
-def test_the_valley_is_as_deep_along_the_sum_as_the_profile_says() -> None:
-    diagnosis, likelihood = told("liquid_drop_1"), told("liquid_drop_1").likelihood
-    valley, _ = compute_valley(likelihood)
-    assert valley is not None
-    along, arm = ({key: np.array(grid[key]) for key in grid} for grid in valley["grids"])
-    increases = along["increases"]
-    sums = along["x_values"] + along["y_values"]
-    best = float(np.exp(diagnosis.findings[-1].profile.best))
-    on = np.abs(sums / best - 1) < 1e-4
-    assert np.all(increases[on] < likelihood.certainty)
-    assert np.all(increases[sums / best < 0.93] > likelihood.certainty)
-    assert increases.min() > -0.1
-    # Beyond the sum a weak, slow branch hides any c: c_p alone is what the sum was.
-    lowest = arm["increases"].min(axis=0)[arm["x_values"][0] > 0.5 * best]
-    assert max(lowest) < likelihood.certainty
-    assert np.ptp(lowest) < 0.5
-    of_two: Any = seen(problem=seen(residuals=seen(model=MODELS["maxwell"])))
-    assert compute_valley(of_two) == (None, None)
-    # A point of the valley that lies below what was taken for the best fit is told.
-    c, c_p = np.exp(likelihood.best[2:, None, None])
-    for times, expected in ((1.0, None), (1.01, pytest.approx(likelihood.best, abs=1e-3))):
-        above = replace(likelihood, misfit=times * likelihood.misfit)
-        assert _increases(above, [2, 3], c * [[0.9, 1.0, 1.1]], c_p * np.ones(3))[1] == expected
-    missed = _with_valley(replace(diagnosis, likelihood=above, lowest=None)).lowest
-    assert missed is not None
-    assert np.exp(missed[2:]).sum() == pytest.approx(best, rel=0.02)
-    # A profile's counts first.
-    found = replace(diagnosis, likelihood=above, lowest=likelihood.best)
-    assert _with_valley(found).lowest is likelihood.best
 
 
 @pytest.mark.parametrize("name", ["springpots_in_series", "springpots_in_parallel"])

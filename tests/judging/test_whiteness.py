@@ -45,13 +45,6 @@ def test_chances_are_of_beta_distributions_with_moments_of_dense_matrices() -> N
     assert whiteness.wandering(residual, basis) == pytest.approx(1 - found[1][1])
 
 
-def test_of_two_means_a_fit_of_the_constant_leaves_their_difference() -> None:
-    (row,) = whiteness.averaged(np.full((1, 10), 10**-0.5))
-    halves = np.repeat([1.0, -1.0], 5)
-    np.testing.assert_allclose(np.outer(row, row), np.outer(halves, halves) / 10)
-    assert len(whiteness.averaged(np.full((1, 9), 1 / 3))) == 0
-
-
 def test_the_cumulative_periodogram_is_kolmogorovs() -> None:
     """SciPy's test of the same shares, as if they were a sample of a uniform distribution."""
     residual = np.random.default_rng(1).standard_normal(4000)

@@ -15,10 +15,11 @@ from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, N
 from biogrip.judging.without_model import (
     _ADDED,
     LEVEL,
-    Estimate,
+    LinearLimits,
     WithoutModel,
     _Excess,
     _Functional,
+    _next_trial,
     tell_without_model,
     times_told,
 )
@@ -48,11 +49,11 @@ def tell(
     return tell_without_model(residuals, confidence=0.95, at_s=at_s)
 
 
-def by_name(found: WithoutModel) -> dict[str, Estimate]:
+def by_name(found: WithoutModel) -> dict[str, LinearLimits]:
     return {each.quantity: each for each in found.told}
 
 
-def between(told: Estimate) -> tuple[float, float]:
+def between(told: LinearLimits) -> tuple[float, float]:
     assert told.low is not None
     assert told.high is not None
     return told.low, told.high
@@ -269,7 +270,7 @@ def test_what_lags_add_at_4_s() -> None:
 
 def test_other_starts_widen_limits_of_what_all_of_them_tell() -> None:
     told, found = (
-        Estimate("G(1 s)", LEVEL, 1.0, "Pa", 15.0, 14.0, 16.0),
+        LinearLimits("G(1 s)", LEVEL, 1.0, "Pa", 15.0, 14.0, 16.0),
         tell(TIMES, zener(TIMES)),
     )
     own, other, none = (
@@ -287,8 +288,26 @@ def test_times_at_which_it_is_told() -> None:
 
 def test_words_are_those_of_a_verdict() -> None:
     ends = [(15.0, 14.0, 16.0), (None, 14.0, None), (None, None, 16.0), (None, None, None)]
-    told = [Estimate("G(1 s)", LEVEL, 1.0, "Pa", *each) for each in ends]
+    told = [LinearLimits("G(1 s)", LEVEL, 1.0, "Pa", *each) for each in ends]
     verdicts = [DETERMINED, BOUNDED_BELOW, BOUNDED_ABOVE, NOT_DETERMINED]
     assert [each.verdict for each in told] == verdicts
     words = ["15.0 Pa (14.0 to 16.0)", "at least 14 Pa", "at most 16 Pa", "not determined"]
     assert [each.words() for each in told] == words
+
+
+@pytest.mark.parametrize(
+    ("aim", "far", "halve", "tried"),
+    [
+        (3.0, 10.0, True, 3.0),
+        # Beyond the far end, or at an end: halfway between 2 and 10, where the excess is known.
+        (12.0, 10.0, True, 6.0),
+        (2.0, 10.0, True, 6.0),
+        # Where nothing is known beyond, no further than that.
+        (12.0, 10.0, False, 10.0),
+        (3.0, 10.0, False, 3.0),
+    ],
+)
+def test_the_next_value_is_between_those_known(
+    aim: float, far: float, halve: bool, tried: float
+) -> None:
+    assert _next_trial(aim, 2.0, far, halve=halve) == tried

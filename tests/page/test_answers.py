@@ -58,13 +58,6 @@ def test_the_surest_method_is_named_before_the_study_s_own() -> None:
     assert answers.say_what_the_study_gives(METHODS, "other", TITLES, "The", 1.0) == ""
 
 
-def test_verdicts_on_claims_are_counted() -> None:
-    told = ("in part", "not", "in part", "not judged", "judged elsewhere")
-    found = answers.say_what_claims_are([{"verdict": verdict} for verdict in told])
-    assert "3 are judged: 2 in part, 1 not; 1 more take another config." in found
-    assert answers.say_what_claims_are([]) == ""
-
-
 def test_medians_stand_beside_targets() -> None:
     """With errors of a run; no median between humps, no row that no trace determines."""
     row = {"case": "drop", "unit": "N s/m", "target": "0.001", "seeds": "50", "basin": "all"}

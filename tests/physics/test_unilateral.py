@@ -9,7 +9,11 @@ from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.protocol import Course, Phase, evaluate, hold, join_phases
 from biogrip.physics.response import step_response, superpose
 from biogrip_study.gripper.simulation import jaw_force
-from biogrip_study.gripper.unilateral import UnilateralResponse, unilateral_response
+from biogrip_study.gripper.unilateral import (
+    UnilateralResponse,
+    _torques_after,
+    unilateral_response,
+)
 from tests.helpers.responses import random_samples
 
 # Slow arms, which differences can follow through contact and flight.
@@ -87,3 +91,8 @@ def test_over_the_whole_range_the_jaws_never_pull(either_gripper: Gripper, steps
             # And to rounding of arms that nothing is between.
             assert np.max(away[until]) < 1e-10 * expected.max() + 1e-14 * 1.6e-9 / 4.4e-7
         assert bool(found.parted_s) == bool(both.min() < -1e-9 * both.max())
+
+
+def test_a_torque_is_counted_from_within_its_phase() -> None:
+    """Of 1 + 2 t + 3 t^2/2 after 2 s: 1 + 4 + 6, 2 + 6, and 3, of both arms."""
+    assert _torques_after(np.array([1.0, 2.0, 3.0]), 2.0).tolist() == [[11.0, 8.0, 3.0]] * 2

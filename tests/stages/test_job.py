@@ -34,7 +34,9 @@ def told(given: dict[str, Any]) -> dict[str, Any]:
 
 @pytest.mark.parametrize("key", ["times_s", "experiment", "gripper", "seeds", "title"])
 def test_what_the_rule_does_not_name_cannot_be_read(key: str) -> None:
-    case = job.case_of(NAME, told(job.settings(STUDY, ["sample", "measurement.noise"], NAME)))
+    case = job.case_with_keys(
+        NAME, told(job.settings(STUDY, ["sample", "measurement.noise"], NAME))
+    )
     assert case.block.sample == STUDY.cases[NAME].block.sample
     assert case.noise == STUDY.cases[NAME].noise
     with pytest.raises(AttributeError, match="not among the keys that the rule names"):
@@ -50,7 +52,10 @@ def test_all_keys_give_the_study_and_its_cases_back() -> None:
     assert (list(again.cases), list(again.points)) == (list(study.cases), list(study.points))
     keys = [*job.CASE_KEYS, "study_seed", "seeds", "methods", "actuator"]
     for name in (*study.cases, *study.points):
-        was, case = study.case(name), job.case_of(name, told(job.settings(study, keys, name)))
+        was, case = (
+            study.case(name),
+            job.case_with_keys(name, told(job.settings(study, keys, name))),
+        )
         for known in ("title", "sample", "noise", "experiment", "parameters", "seeds"):
             assert getattr(case, known) == getattr(was, known)
         np.testing.assert_array_equal(case.times_s, was.times_s)
@@ -79,7 +84,7 @@ def test_a_default_of_a_case_goes_before_what_the_study_has() -> None:
     shared = "instrument: creep\nprotocol: {phases: [{duration_s: 9, stress_Pa: 4}]}"
     study = study_of(f"{shared}\nonly: [{NAME}]\ncases: {{{NAME}: {{{own}}}}}")
     told_of = job.settings(study, ["instrument"], NAME)
-    assert job.case_of(NAME, told_of).block.instrument == study.case(NAME).block.instrument
+    assert job.case_with_keys(NAME, told_of).block.instrument == study.case(NAME).block.instrument
 
 
 def test_every_seed_is_in_one_batch_and_full_ones_stay() -> None:

@@ -14,7 +14,7 @@ from biogrip.physics.gripper import torque
 from biogrip.physics.noise import Noise
 from biogrip_study.config.case_blocks import OVERRIDABLE
 from biogrip_study.config.study import DEFAULTS, Study, load_given_study, load_study
-from biogrip_study.methods.registry import SETTINGS
+from biogrip_study.methods.registry import METHODS
 from tests.helpers.key_reference import STUDY, file_schema, leaves
 from tests.helpers.places import CONFIG, ROOT
 
@@ -85,6 +85,12 @@ def test_bad_config_is_explained(tmp_path: Path, text: str, words: str) -> None:
         text = SWEEP.replace(old, new)
     said = refusal(tmp_path, text.replace("MANY", ", ".join(map(str, range(6000)))))
     assert re.search(words, said), said
+
+
+def test_a_wrong_block_of_the_study_is_said_once_and_not_of_every_case(tmp_path: Path) -> None:
+    said = refusal(tmp_path, "seeds: 3\nprotocol: 5\n").splitlines()
+    assert len(said) == 2
+    assert "my.yaml, line 2: protocol: found 5" in said[1]
 
 
 def test_all_problems_are_said_once_and_many_are_cut_short(tmp_path: Path) -> None:
@@ -229,7 +235,7 @@ def test_every_block_refuses_unknown_keys() -> None:
 
 
 def test_a_case_may_override_the_blocks_of_the_study_and_of_every_method() -> None:
-    methods = {*SETTINGS}
+    methods = {method.key for method in METHODS.values()}
     assert methods < set(OVERRIDABLE)
     assert set(OVERRIDABLE) == set(STUDY.keys["cases"].values.keys) & set(STUDY.keys)
 
@@ -289,3 +295,8 @@ def test_whatever_is_added_changes_no_other_point(tmp_path: Path) -> None:
         assert old in SWEEP
         after = load(tmp_path, SWEEP.replace(old, new)).points
         assert {name: after[name].plain for name in before} == before
+
+
+def test_a_wrong_block_of_the_study_is_told_once(tmp_path: Path) -> None:
+    """Below a headline, and not once more of each of the three cases, which inherit it."""
+    assert refusal(tmp_path, "protocol: 5").count("\n") == 1

@@ -1,4 +1,5 @@
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -6,13 +7,16 @@ import pytest
 from scipy.stats import binomtest
 
 from biogrip.errors import BiogripError
+from biogrip.physics.response import step_response, superpose
 from biogrip.records import read_rows, write_object
+from biogrip_study.gripper.calibration import CalibratedArm, calibration_yaml
 from biogrip_study.records.identifications import INTERVALS
 from biogrip_study.stages import judgement as stage
 from biogrip_study.stages import targets
 from biogrip_study.tables.layout import Column, ShownTable, convert, write
-from biogrip_study.tables.study import coverage, verdict_counts
+from biogrip_study.tables.study import bounds_at_truth, coverage, verdict_counts
 from tests.helpers.default import study_of
+from tests.helpers.problems import MODEL, TORQUE, rotation
 
 CASE = "liquid_drop_2"
 OVERLAY = """
@@ -24,7 +28,7 @@ cases: {endothelial_cell: null, liquid_drop_1: null}
 
 @pytest.fixture
 def target(tmp_path: Path) -> Path:
-    targets.simulate(study_of(OVERLAY).cases[CASE], tmp_path / "target.csv")
+    targets.simulate_target(study_of(OVERLAY).cases[CASE], tmp_path / "target.csv")
     return tmp_path / "target.csv"
 
 
@@ -94,11 +98,53 @@ def test_verdicts_of_every_seed_are_counted(tmp_path: Path) -> None:
     assert "at 90 %" in made.caption
 
 
+CELL = [35.0, 12.3, 299.9, 1e-3]
+TWINS = """
+measurement: {rate_Hz: 1.0}
+identifiability: {verdicts_every: 100}
+cases:
+  liquid_drop_1: null
+  liquid_drop_2: null
+  endothelial_cell: {fixed: {c_p: 1e-3}}
+  twin: {sample: {model: generalized_maxwell, k: 35, k_p: 12.3, c: 299.9, c_p: 1e-3},
+         fixed: {c_p: 1e-3}}
+"""
+
+
+def test_the_bound_of_a_case_is_that_of_its_calibration(tmp_path: Path) -> None:
+    """The twin's arms are thought a hundred times as stiff; bounds by central differences."""
+    study, stiffness = study_of(TWINS), {"endothelial_cell": 4.4e-7, "twin": 4.4e-5}
+    logs = np.log(CELL[:3]) + 1e-5 * np.vstack((np.eye(3), -np.eye(3)))
+    network = MODEL.network(np.column_stack((np.exp(logs), np.full(6, CELL[3]))))
+    bounds = {}
+    for name, case in study.cases.items():
+        arm = replace(study.gripper.left, stiffness_Nm_per_rad=stiffness[name])
+        calibrated = CalibratedArm(arm, arm)
+        (tmp_path / f"{name}.yaml").write_text(calibration_yaml(calibrated, calibrated))
+        rows = [(name, "k", seed, 35.1, 34, 36, 35.2, "", "", "") for seed in (1, 2)]
+        INTERVALS.write(tmp_path / name / "seeds_1-2.csv", rows)
+        targets.simulate_target(case, tmp_path / f"{name}.csv")
+        thought = step_response(replace(study.gripper, left=arm, right=arm), network)
+        above, below = np.split(superpose(thought, TORQUE, case.times_s), 2)
+        slopes = (above - below) / 2e-5
+        sigma = 0.1 * rotation(MODEL, CELL, case.times_s).max()
+        bounds[name] = 100 * sigma * np.sqrt(np.linalg.inv(slopes @ slopes.T)[0, 0])
+    made, calibrations, batches = (
+        [tmp_path / file.format(name) for name in study.cases]
+        for file in ("{}.csv", "{}.yaml", "{}/seeds_1-2.csv")
+    )
+    table = coverage(study, made, batches, calibrations)
+    assert {row["case"]: row["bound_percent"] for row in table.rows} == pytest.approx(
+        bounds, rel=1e-4
+    )
+    assert bounds["twin"] > 1.1 * bounds["endothelial_cell"]
+
+
 def test_some_seeds_are_judged_in_full(tmp_path: Path, target: Path) -> None:
     expected = tmp_path / "expected.json"
     write_object(expected, {"quantities": [{"quantity": "k", "verdict": "determined"}]})
     case = study_of(OVERLAY.replace("0.9}", "0.9, verdicts_every: 3}")).case(CASE)
-    stage.estimate(case, range(2, 5), target, expected, [], tmp_path / "i.csv")
+    stage.estimate_intervals(case, range(2, 5), target, expected, [], tmp_path / "i.csv")
     found = INTERVALS.read(tmp_path / "i.csv")
     assert set(found["seed"]) == {2, 3, 4}
     whole = found[found["verdict"].notna()]
@@ -149,3 +195,30 @@ def test_markup_is_text_in_every_format(tmp_path: Path) -> None:
         assert [len(re.findall(r"(?<!\\)\|", row)) for row in markdown.splitlines()[-3:]] == [2] * 3
         assert "<img" not in markdown + page
         assert read_rows(tmp_path / "t.csv") == [["a"], [given]]
+
+
+def test_the_bound_of_a_case_is_of_its_own_calibration(tmp_path: Path) -> None:
+    """An arm a thousand times stiffer leaves less of a cell to be seen."""
+    study = study_of("{measurement: {rate_Hz: 1.0}, cases: {endothelial_cell: null}}")
+    arm = study.cases[CASE].gripper.left
+    files, of_targets, batches = [], [], []
+    for name, times in (("liquid_drop_1", 1.0), (CASE, 1000.0)):
+        stiff = replace(arm, stiffness_Nm_per_rad=times * arm.stiffness_Nm_per_rad)
+        files.append(tmp_path / f"{name}.yaml")
+        files[-1].write_text(calibration_yaml(*[CalibratedArm(stiff, arm)] * 2))
+        of_targets.append(tmp_path / f"{name}.csv")
+        targets.simulate_target(study.cases[name], of_targets[-1])
+        batches.append(tmp_path / name / "seeds_0-1.csv")
+        every = ("k", "k_p", "c", "c_p", "c + c_p")
+        rest = 1.0, 0.9, 1.1, 1.0, "determined", 0.9, 1.1
+        seeds = [(name, q, seed, *rest) for seed in range(2) for q in every]
+        INTERVALS.write(batches[-1], seeds)
+    rows = coverage(study, of_targets, batches, files).rows
+    for name, file, of_target in zip(study.cases, files, of_targets, strict=True):
+        (shown,) = (row for row in rows if (row["case"], row["quantity"]) == (name, "c + c_p"))
+        alone = {
+            q.label: bound for q, bound in bounds_at_truth(study.cases[name], of_target, [file])
+        }
+        assert shown["bound_percent"] == pytest.approx(100 * alone["c + c_p"])
+    ends = [row["bound_percent"] for row in rows if row["quantity"] == "c + c_p"]
+    assert ends[1] > 10 * ends[0]

@@ -17,7 +17,7 @@ from biogrip_study.records.identifications import (
     MODEL_FITS,
     basins,
     chi_square_increase,
-    columns,
+    identification_columns,
     near_noise,
     share_with_limits,
 )
@@ -34,7 +34,7 @@ TRUE = {"k": 8.0, "k_p": 0.0, "c": 4.0, "c_p": 1.0}
 def identified(path: Path, rows: list[list[Any]], **more: float) -> Path:
     """Write identifications of a drop: method, seed, parameters, misfit, noise, evaluations."""
     rows = [["drop", *row[:-1], 60, row[-1], "stalled"] for row in rows]
-    frame = pd.DataFrame(rows, columns=columns(MODELS["generalized_maxwell"]))
+    frame = pd.DataFrame(rows, columns=identification_columns(MODELS["generalized_maxwell"]))
     frame.assign(**more).to_csv(path, index=False)
     return path
 

@@ -7,7 +7,7 @@ import pytest
 
 from biogrip.judging.likelihood import headlines
 from biogrip.records import write_rows
-from biogrip_study.records.identifications import columns
+from biogrip_study.records.identifications import identification_columns
 from biogrip_study.tables import sweeps as stage
 from biogrip_study.tables.sweeps import robustness
 from tests.helpers.default import study_of
@@ -52,8 +52,8 @@ def judged(tmp_path_factory: pytest.TempPathFactory) -> Path:
         rows = [[name, method, n, K[n], 12.3, 330, 1, misfits[n], *ends] for n in range(5)]
         files.append(folder / name / method / "seeds_0-4.csv")
         files[-1].parent.mkdir(parents=True)
-        write_rows(files[-1], columns(MODEL), rows)
-    stage.judge(STUDY, "both", files, [], folder / f"{CASE}.csv")
+        write_rows(files[-1], identification_columns(MODEL), rows)
+    stage.judge_points(STUDY, "both", files, [], folder / f"{CASE}.csv")
     return folder / f"{CASE}.csv"
 
 

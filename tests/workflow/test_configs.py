@@ -70,7 +70,7 @@ def test_what_changes_no_result_is_no_other_study(tmp_path: Path) -> None:
     keys = "batch_size=9", "pdf=true"
     asked = "check", "results/figures/comb.pdf"
     run = snakemake(tmp_path, "-n", "--quiet", "rules", "--config", *keys, "--", *asked)
-    assert jobs_of(run)["tables"] == jobs_of(run)["claims"] == jobs_of(run)["check"] == 1
+    assert jobs_of(run)["errors"] == jobs_of(run)["claims"] == jobs_of(run)["check"] == 1
 
 
 def test_what_has_no_name_has_nothing_published(tmp_path: Path) -> None:

@@ -84,7 +84,8 @@ def test_a_batch_killed_at_any_moment_ends_with_the_undisturbed_bytes(
 ) -> None:
     """And no trace that had its result loses it."""
     files = [f"{number}.csv" for number in range(6)]
-    command = ["-m", "biogrip", "identify", *files, "--csv", "found.csv", "--config", few, *more]
+    command: list[str | Path] = ["-m", "biogrip", "identify", *files, "--config", few]
+    command += ["--csv", "found.csv", *more]
 
     def folder_of(name: str) -> Path:
         (folder := tmp_path / name).mkdir()

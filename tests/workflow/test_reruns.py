@@ -6,15 +6,17 @@ from typing import Any
 import pytest
 
 from biogrip.config.source import overlaid
-from tests.helpers.runs import TINY, clone, dry_run, jobs_of, planned, results_of, snakemake
+from tests.helpers.runs import SMALL, TINY, clone, dry_run, jobs_of, planned, results_of, snakemake
 
-# Of the study: what puts all cases together, and what of it has more than simulated traces.
-TOLD = {"tables": 1, "claims": 1, "page": 1}
-STUDY = TOLD | {"figures": 1, "evidence": 1}
-# Of a simulated case, from its traces to their judgement, with one batch of them.
+# What puts all cases together, whatever changed, and what compares their identifications.
+TOLD = {"claims": 1, "page": 1}
+COMPARED = TOLD | dict.fromkeys(("errors", "methods", "moduli", "overview"), 1)
+# Of a simulated case, from its traces to their judgement, with one batch of them; and what of the
+# study reads these.
 TRACES = {"measurement": 1, "identification": 2, "model_fits": 1, "intervals": 1, "judgement": 1}
-# Of a simulated case and of a recorded trace.
-RECORDED = {"case_tables": 2, "case_figures": 1, "recorded_case_figures": 1}
+TRACES |= {"evidence": 1, "readings_of_case": 1, "models": 1, "coverage": 1}
+# Figures of a simulated case and of a recorded trace.
+DRAWN = {"case_figures": 1, "recorded_case_figures": 1, "summary": 2}
 CELL = {"sample": {"model": "liquid_drop", "k": 20.0, "k_p": 5.0, "c": 80.0}}
 LEVELS = {
     "cases": ["liquid_drop_2"],
@@ -24,39 +26,46 @@ LEVELS = {
 CHANGES: dict[str, tuple[dict[str, Any], dict[str, int]]] = {
     "noise": (
         {"measurement": {"noise": {"level": 0.2}}},
-        TRACES | {"recorded_judgement": 1, "mechanics": 1} | RECORDED | STUDY,
+        TRACES
+        | {"recorded_judgement": 1, "mechanics": 1, "case_tables": 1, "case_verdicts": 2}
+        | {"answer": 1}
+        | DRAWN
+        | COMPARED,
     ),
     "models to compare": (
         {"model_selection": {"models": ["maxwell"]}},
-        {"model_fits": 2, "recorded_judgement": 1, "case_tables": 1, "recorded_case_figures": 1}
+        {"model_fits": 2, "models": 1, "recorded_judgement": 1, "case_verdicts": 1}
+        | {"recorded_case_figures": 1, "summary": 1}
         | TOLD,
     ),
     "a case, and the title of another": (
         {"cases": {"new": CELL, "liquid_drop_2": {"title": "A drop"}}},
-        {"target": 1, "mechanics": 1, "linearisation": 1, "case_tables": 2, "case_figures": 1}
-        | {"case_figures_without_valley": 1, "gripper_figures": 1}
+        {"target": 1, "mechanics": 1, "linearisation": 1, "gripper_figures": 1}
+        | {"case_tables": 2, "case_verdicts": 2, "case_figures": 2, "summary": 2}
         | TRACES
-        | STUDY,
+        | COMPARED,
     ),
     "seeds": (
         {"seeds": 7},
-        {"measurement": 3, "identification": 6, "model_fits": 3, "mechanics": 1}
-        | {"case_tables": 1, "case_figures": 1}
-        | STUDY,
+        {"measurement": 3, "identification": 6, "model_fits": 3, "models": 1, "mechanics": 1}
+        | {"evidence": 1, "readings_of_case": 1}
+        | {"case_tables": 1, "case_figures": 1, "summary": 1}
+        | COMPARED,
     ),
     "what is read of a recorded trace": (
         {"cases": {"mine": {"measurement": {"until_s": 300.0}}}},
-        {"recording": 1, "identification": 2, "model_fits": 1, "recorded_judgement": 1}
-        | {"case_tables": 1, "recorded_case_figures": 1}
+        {"recording": 1, "identification": 2, "model_fits": 1, "models": 1}
+        | {"recorded_judgement": 1, "case_tables": 1, "case_verdicts": 1, "errors": 1}
+        | {"recorded_case_figures": 1, "summary": 1}
         | TOLD,
     ),
     # Whose points have no figures of their own.
     "budget of a method, and a sweep": (
         {"genetic_algorithm": {"max_generations": 5}, "sweeps": {"levels": LEVELS}},
-        # Evidence reads traces alone.
-        {"identification": 6, "target": 2, "measurement": 2, "sweep": 1}
-        | RECORDED
-        | {rule: 1 for rule in STUDY if rule != "evidence"},
+        {"identification": 6, "target": 2, "measurement": 2, "sweep": 1, "case_tables": 2}
+        | {"readings_of_case": 1}
+        | DRAWN
+        | COMPARED,
     ),
 }
 
@@ -67,11 +76,19 @@ def test_what_uses_a_setting_runs_again_and_nothing_else(tiny: Path, name: str) 
     assert planned(tiny, config=overlaid(TINY, change)) == expected
 
 
+def test_a_table_and_a_figure_take_the_jobs_whose_files_they_need(tmp_path: Path) -> None:
+    """Of one sample and two methods: no intervals, no models, no verdicts."""
+    identified = {"target": 1, "measurement": 1, "identification": 2, "case_tables": 1}
+    config = SMALL | {"only": ["liquid_drop_2"]}
+    for target, rule in (("tables/errors.csv", "errors"), ("figures/moduli.png", "moduli")):
+        assert planned(tmp_path, f"results/{target}", config=config) == {**identified, rule: 1}
+
+
 def test_a_dry_run_says_which_setting_changed_from_what_to_what(tiny: Path) -> None:
     """Of the command line, from which a number in a block comes as text."""
     block = "evaluation={near_noise_tolerance: 0.03}"
     told = dry_run(tiny, "--config", block, config=TINY)
-    assert jobs_of(told) == RECORDED | STUDY
+    assert jobs_of(told) == {"case_tables": 2, "evidence": 1} | DRAWN | COMPARED
     for when, value in (("before", 0.02), ("now", 0.03)):
         evaluation = f"'evaluation': {{'optimum_tolerance': 1.0, 'near_noise_tolerance': {value}}}"
         assert re.search(rf"{when}: {{[^:]*{evaluation}", told)
@@ -82,7 +99,7 @@ def test_an_edited_or_older_trace_in_the_place_of_another_is_read(tiny_copy: Pat
     trace = tiny_copy / "mine.csv"
     first, *lines = trace.read_text().splitlines(keepends=True)
     trace.write_text("".join([first, *lines, "400.5,1e-3\n"]))
-    again = {"recording": 1, "identification": 2, "recorded_judgement": 1, "case_tables": 1}
+    again = {"recording": 1, "identification": 2, "case_tables": 1}
     assert planned(tiny_copy, "results/identifications/mine.csv", config=TINY) == again
     for kept, jobs in ((lines[::2], {"recording": 1}), (lines, {})):
         trace.write_text("".join([first, *kept]))

@@ -1,12 +1,16 @@
 """Judge the claims of the paper in claims.yaml, which says how, by the tables of a study.
 
 A claim names one of `JUDGES` with its numbers; each quantity and sample that it is said of has a
-verdict of its own. The rules of verdicts stand in `workflow/report/tables/claims.rst`, the caption
-of the table. A second table has the paper's Tables 5 to 7 beside what the study finds.
+verdict of its own. Runs of the genetic algorithm have a verdict under each interpretation of the
+paper that is not excluded; where these differ, the claim depends on the interpretation. The rules
+of verdicts stand in `workflow/report/tables/claims.rst`, the caption of the table. A second table
+has the paper's Tables 5 to 7 beside what the study finds.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from string import Formatter
 from typing import TYPE_CHECKING, Any
@@ -17,10 +21,13 @@ import yaml
 from scipy.special import bdtr
 
 from biogrip.arrays import Array
+from biogrip.judging.likelihood import bounds_percent
 from biogrip.judging.verdicts import DETERMINED
-from biogrip.physics.gripper import ARM_KEYS
-from biogrip.physics.noise import Noise, add_noise, stream
+from biogrip.levels import DETERMINED_PERCENT
+from biogrip.physics.gripper import ARM_KEYS, Gripper
+from biogrip.physics.noise import Noise, add_noise, rms, standard_deviation, stream
 from biogrip.physics.protocol import sample_times
+from biogrip.physics.simulation import simulated_response
 from biogrip_study.config.study import Case, Study
 from biogrip_study.gripper.calibration import FreeMotion, calibrate, free_motion
 from biogrip_study.records.identifications import (
@@ -39,7 +46,8 @@ if TYPE_CHECKING:
     snakemake: Any
 
 REPLICATED, IN_PART, NOT = "replicated", "in part", "not"
-TOO_FEW, UNDECIDED = "too few runs to tell", "cannot be told"
+UNDECIDED, DEPENDS = "undecided", "depends on the interpretation"
+UNIDENTIFIABLE = "not identifiable"
 TOLD, ELSEWHERE = "not judged", "judged elsewhere"
 MOST, FEW = 0.9, 0.1
 """Shares from which, and up to which, something holds nearly always or hardly ever."""
@@ -47,10 +55,14 @@ CLOSE, NEAR = 0.05, 0.1
 """Relative differences up to which a rounded number, and an identified value, is the paper's."""
 AROUND = 10
 """Generations about the paper's that are still around it."""
-FASTER = 1.25
-"""Exponent of the noise up to which an error grows no faster than it."""
-OWN = "two digits from 1"
-"""Name of the encoding that the text describes, beside a reading that can print the tables."""
+PAPERS_NOISE = 0.1
+"""The paper's noise, as a share of the peak."""
+REFUTED = 10
+"""Rise of BIC from which a model is refuted."""
+EXCLUDED = "excluded"
+"""Verdict on a reading that its likelihood rules out."""
+TEXT = "two digits from 1"
+"""Name of the encoding that the text describes, by which the study's own runs are made."""
 
 Judged = tuple[str, str, str]
 """What is judged, the verdict, and the evidence."""
@@ -69,11 +81,15 @@ class Results:
     """Tables by name; `of_table` has the number of the paper's table that rows belong to."""
 
     def rows(self, table: str, of: Sequence[int], where: str) -> pd.DataFrame:
-        """Return rows of a table; raise `LackingError` if there is none."""
+        """Return rows of a table, of the paper's cases alone if it has rows of cases.
+
+        Raises `LackingError` if there is none.
+        """
         if table not in self.tables:
             raise LackingError(f"the study has no table {table}")
         rows = self.tables[table]
-        rows = rows[rows["of_table"].isin(of)] if of else rows
+        if "of_table" in rows:
+            rows = rows[rows["of_table"].isin(of) if of else rows["of_table"].notna()]
         if rows.empty:
             raise LackingError(f"the study has no case of Table {' or '.join(map(str, of))}")
         rows = rows.query(where, local_dict={"study": self.study}) if where else rows
@@ -88,7 +104,7 @@ def by_interval(low: float, high: float, few: float = FEW, most: float = MOST) -
         return REPLICATED
     if high <= few:
         return NOT
-    return IN_PART if few < low and high < most else TOO_FEW
+    return IN_PART if few < low and high < most else UNDECIDED
 
 
 def in_words(hits: int, runs: int) -> str:
@@ -125,79 +141,168 @@ def judge_rows(
     where: str = "",
     by: str | Sequence[str] = (),
     name: str = "",
-    holds: str = "",
-    each: str = "",
-    count: Sequence[str] = (),
-    around: Sequence[Any] = (),
-    slope: Sequence[str] = (),
-    unless: str = "",
+    **rule: Any,
 ) -> list[Judged]:
-    """Judge rows of a table, those of each value of the columns `by` apart.
+    """Judge rows of a table, those of each value of the columns `by` apart, by a `rule`.
 
-    Rows are those of tables of the paper (`of`) and of a condition (`where`). If they are runs,
-    with a column `seed`, the share counts for which `holds` is true, with `each` in all rows of the
-    same value. Else it has to be true of all rows. Instead of it, `count` names columns of hits and
-    of runs, `around` a column whose median is to be near a number, and `slope` a column with its
-    lowest and its highest value. Where `unless` is true nothing can be told. Runs of several
-    readings are judged by the one that can print the paper's values, with the text's beside it.
+    Rows are those of tables of the paper (`of`) and of a condition (`where`). The rule has the
+    keywords of `decide`. Runs, which have a column `judging`, are judged under each of their
+    readings of the paper for which it is true; the evidence is that of the first, and the range
+    over the others, with the runs of the text's encoding beside it if these do not judge.
 
-    Conditions are those of pandas' `eval`. `name` and evidence may name, in braces, the `share`,
-    the number of `rows`, of `hits` and of `misses`, the `study`, and statistics of columns, as in
-    ``{median[misfit]:.2g}``.
+    `name` and evidence may name, in braces, the `share`, the number of `rows`, of `hits` and of
+    `misses`, the `study`, and statistics of columns, as in ``{median[misfit]:.2g}``.
     """
     judged = []
     rows = results.rows(table, of, where)
-    for _, every in rows.groupby(by, sort=False) if by else [("", rows)]:
-        group = every[every["able"]] if "able" in every and every["able"].any() else every
-        numbers, verdict, values = group.select_dtypes("number"), "", group.to_dict("list")
-        told: dict[str, Any] = {"study": results.study, "rows": len(group), "all": values}
-        told |= {"first": {label: column[0] for label, column in values.items()}}
-        told |= {"least": numbers.min(), "median": numbers.median(), "most": numbers.max()}
-        told |= {f"p{percent}": numbers.quantile(percent / 100) for percent in (5, 25, 75, 95)}
-        if holds:
-            those = _those(results, group, holds, each)
-            hits, runs = int(those.sum()), len(those)
-            told |= {"hits": hits, "misses": runs - hits, "share": in_words(hits, runs)}
-            if "seed" in group:
-                verdict = by_interval(*share_with_limits(hits, runs)[1:])
-            else:
-                verdict = REPLICATED if hits == runs else NOT
-        elif count:
-            hits, runs = (int(group[column].sum()) for column in count)
-            told["share"] = in_words(hits, runs)
-            verdict = by_interval(*share_with_limits(hits, runs)[1:])
-        elif around:
-            told["middle"], low, high = median_with_limits(group[around[0]].to_numpy(float))
-            told |= {"low": low, "high": high}
-            inside = around[1] - AROUND <= low and high <= around[1] + AROUND
-            outside = high < around[1] - AROUND or low > around[1] + AROUND
-            verdict = REPLICATED if inside else NOT if outside else TOO_FEW
-        elif slope:
-            low, high = group[slope[1]].min(), group[slope[2]].max()
-            verdict = REPLICATED if high <= FASTER else NOT if low > FASTER else TOO_FEW
-        if unless and group.eval(unless).all():
-            verdict = UNDECIDED
-        said = Evidence().format(evidence, **told)
-        if len(group) < len(every) and holds:
-            beside = _those(results, every[~every["able"]], holds, each)
-            said = f"{said[:-1]}; with {OWN} {in_words(int(beside.sum()), len(beside))}."
-        judged.append((Evidence().format(name, **told), verdict, said))
+    for _, group in rows.groupby(by, sort=False) if by else [("", rows)]:
+        told = _statistics(group) | {"study": results.study}
+        what = Evidence().format(name, **told)
+        if "judging" in group:
+            judged.append((what, *_judge_runs(results, group, evidence, rule)))
+        else:
+            verdict, _, more = decide(results, group, **rule)
+            judged.append((what, verdict, Evidence().format(evidence, **told | more)))
     return judged
 
 
-def _those(results: Results, rows: pd.DataFrame, holds: str, each: str) -> Any:
+def _judge_runs(
+    results: Results, group: pd.DataFrame, evidence: str, rule: Mapping[str, Any]
+) -> tuple[str, str]:
+    """Return the verdict on runs under all readings that judge, and the evidence."""
+    found = {
+        str(title): (runs, *decide(results, runs, **rule))
+        for title, runs in group[group["judging"]].groupby("reading", sort=False)
+    }
+    title, (runs, *_, more) = next(iter(found.items()))
+    said = Evidence().format(evidence, **_statistics(runs), study=results.study, **more)
+    verdicts = [verdict for _, verdict, *_ in found.values()]
+    if not rule:
+        return verdicts[0], said
+    said += f" Runs have {title}"
+    beside = group[~group["judging"] & (group["reading"] == TEXT)]
+    if len(beside):
+        said += f"; with {TEXT} it is {decide(results, beside, **rule)[2]['number']}"
+    if len(found) > 1:
+        ordered = sorted(found.items(), key=lambda item: item[1][2])
+        ends = (f"{of[3]['number']} (“{name}”)" for name, of in (ordered[0], ordered[-1]))
+        counts = (f"{count} {verdict}" for verdict, count in Counter(verdicts).items())
+        said += f"; over {len(found)} interpretations {' to '.join(ends)}, {', '.join(counts)}"
+    return agreed(verdicts), f"{said}."
+
+
+def agreed(verdicts: Sequence[str]) -> str:
+    """Return the verdict in which those under all readings agree; what is undecided denies none."""
+    decided = {*verdicts} - {UNDECIDED}
+    return DEPENDS if len(decided) > 1 else UNDECIDED if UNDECIDED in verdicts else decided.pop()
+
+
+def _statistics(group: pd.DataFrame) -> dict[str, Any]:
+    """Return what evidence may name of a group of rows, whatever the rule."""
+    numbers = group.select_dtypes("number")
+    told = {"rows": len(group), "first": {column: group[column].iloc[0] for column in group}}
+    told |= {"least": numbers.min(), "median": numbers.median(), "most": numbers.max()}
+    return told | {f"p{percent}": numbers.quantile(percent / 100) for percent in (5, 95)}
+
+
+def decide(
+    results: Results,
+    group: pd.DataFrame,
+    *,
+    holds: str = "",
+    each: str = "",
+    fails: str = "",
+    count: Sequence[str] = (),
+    around: Sequence[Any] = (),
+    unless: str = "",
+) -> tuple[str, float, dict[str, Any]]:
+    """Return the verdict on rows, the number that decides, and what evidence may name of it.
+
+    If rows are runs, with a column `seed`, the share counts for which `holds` is true, with `each`
+    in all rows of the same value. Else it has to be true of all rows; where `fails` is given and
+    not true of all, it may hold in part. Instead of it, `count` names columns of hits and of runs,
+    and `around` a column whose median is to be near a number. Where `unless` is true no trace tells
+    anything. Conditions are those of pandas' `eval`.
+    """
+    verdict, number, told = "", 0.0, dict[str, Any]()
+    if around:
+        number, low, high = median_with_limits(group[around[0]].to_numpy(float))
+        told = {"middle": number, "low": low, "high": high, "number": f"{number:.0f}"}
+        inside = around[1] - AROUND <= low and high <= around[1] + AROUND
+        outside = high < around[1] - AROUND or low > around[1] + AROUND
+        verdict = REPLICATED if inside else NOT if outside else UNDECIDED
+    elif holds or count:
+        hits, runs = _counted(results, group, holds, each, count)
+        number, *limits = share_with_limits(hits, runs)
+        told = {"hits": hits, "misses": runs - hits, "share": in_words(hits, runs)}
+        told["number"] = f"{100 * number:.0f} %"
+        if "seed" in group or count:
+            verdict = by_interval(*limits)
+        elif hits == runs:
+            verdict = REPLICATED
+        else:
+            verdict = IN_PART if fails and not group.eval(fails).all() else NOT
+    if unless and group.eval(unless).all():
+        verdict = UNIDENTIFIABLE
+    return verdict, number, told
+
+
+def _counted(
+    results: Results, rows: pd.DataFrame, holds: str, each: str, count: Sequence[str]
+) -> tuple[int, int]:
+    """Return how often something holds, and of how many."""
+    if count:
+        hits, runs = (int(rows[column].sum()) for column in count)
+        return hits, runs
     those = rows.eval(holds, local_dict={"study": results.study})
-    return those.groupby(rows[each]).all() if each else those
+    those = those.groupby(rows[each]).all() if each else those
+    return int(those.sum()), len(those)
 
 
-def judge_jaw_gap(results: Results, evidence: str) -> list[Judged]:
-    """Judge by how much the angle at contact changes what is found, beside what noise allows."""
-    angles = np.radians(results.rows("contact", (), "")["reference_angle_deg"].to_numpy(float))
-    scale = np.sin(angles) ** 2
-    change = 100 * float(np.nanmax(scale) / np.nanmin(scale) - 1)
-    noise = float(results.rows("coverage", (), "")["bound_percent"].min())
-    said = evidence.format(change=change, noise=noise)
-    return [("", REPLICATED if change <= noise else NOT, said)]
+def judge_grippers(
+    results: Results,
+    evidence: str,
+    *,
+    others: Callable[[Results, Gripper], Iterator[Gripper]],
+    changes: bool,
+) -> list[Judged]:
+    """Judge by the factor by which other grippers, known, change what noise allows at best.
+
+    The noise is that of the case in rad. `changes` tells which of both is claimed.
+    """
+    judged = []
+    for case in results.study.cases.values():
+        device = case.gripper, case.network, case.torque
+        reading = simulated_response(*device, case.times_s)[0]
+        noise = replace(case.noise, level_rad=rms(standard_deviation(reading, case.noise)))
+        every = []
+        for gripper in (case.gripper, *others(results, case.gripper)):
+            problem = replace(case.experiment, gripper=gripper)
+            bounds = bounds_percent(problem, noise, case.parameters, case.times_s)
+            every.append([bound for _, bound in bounds])
+        told = np.array(every)[:, np.array(every[0]) < DETERMINED_PERCENT]
+        factor = float(np.max(told.max(axis=0) / told.min(axis=0)))
+        said = evidence.format(factor=factor)
+        claimed = factor > 1 + NEAR if changes else factor <= 1 + CLOSE
+        judged.append((f"Table {case.published.table}", REPLICATED if claimed else NOT, said))
+    return judged
+
+
+def _at_contact(results: Results, gripper: Gripper) -> Iterator[Gripper]:
+    for angle in results.rows("contact", (), "")["reference_angle_deg"].dropna():
+        yield replace(gripper, reference_angle_deg=float(angle))
+
+
+def _devices(_: Results, gripper: Gripper) -> Iterator[Gripper]:
+    """Yield grippers with arms of two thirds to four thirds the length, half to twice as stiff."""
+    for factor in (2 / 3, 4 / 3):
+        yield replace(gripper, arm_length_m=factor * gripper.arm_length_m)
+    for factor in (0.5, 2.0):
+        left, right = (
+            replace(arm, stiffness_Nm_per_rad=factor * arm.stiffness_Nm_per_rad)
+            for arm in (gripper.left, gripper.right)
+        )
+        yield replace(gripper, left=left, right=right)
 
 
 def judge_free_arm(results: Results, evidence: str) -> list[Judged]:
@@ -209,16 +314,17 @@ def judge_free_arm(results: Results, evidence: str) -> list[Judged]:
     motion = free_motion(arm, time_s, *causes)
     noise = Noise("gaussian", test.noise_level, "peak")
     rng = stream(results.study.config.study_seed, "claims", 0, "calibration")
-    step, impulse = (add_noise(each, noise, rng) for each in (motion.step, motion.impulse))
-    found = calibrate(FreeMotion(time_s, step, impulse), *causes).arm
-    errors = [100 * abs(getattr(found, key) / getattr(arm, key) - 1) for key in ARM_KEYS]
+    step, impulse = (add_noise(clean, noise, rng) for clean in (motion.step, motion.impulse))
+    fitted = calibrate(FreeMotion(time_s, step, impulse), *causes).arm
+    errors = [100 * abs(getattr(fitted, key) / getattr(arm, key) - 1) for key in ARM_KEYS]
     verdict = REPLICATED if max(errors) <= 100 * CLOSE else NOT
     return [("", verdict, evidence.format(*errors, noise=100 * test.noise_level))]
 
 
 JUDGES: Mapping[str, Any] = {
     "rows": judge_rows,
-    "jaw_gap": judge_jaw_gap,
+    "jaw_gap": partial(judge_grippers, others=_at_contact, changes=False),
+    "device": partial(judge_grippers, others=_devices, changes=True),
     "free_arm": judge_free_arm,
 }
 
@@ -229,9 +335,8 @@ def judge(claim: Mapping[str, Any], results: Results) -> list[Judged]:
     try:
         judged = JUDGES[name](results, claim["evidence"], **(numbers or {}))
     except LackingError as lacking:
-        if "elsewhere" in claim:
-            return [("", ELSEWHERE, f"{claim['elsewhere']} has what it takes.")]
-        return [("", UNDECIDED, f"Not here: {lacking}.")]
+        other = claim.get("elsewhere", "Another study")
+        return [("", ELSEWHERE, f"{other} has what it takes: {lacking}.")]
     return [(what, TOLD if claim.get("told") else verdict, said) for what, verdict, said in judged]
 
 
@@ -260,8 +365,6 @@ _COMPARED_COLUMNS = (
     Column("median_error_percent", "Median error of a run %", 2),
     Column("median_from_percent", "from", 2),
     Column("median_to_percent", "to", 2),
-    Column("p25", "Quartiles from", 3),
-    Column("p75", "to", 3),
     Column("near_share", "Share near the paper's value", 2),
     Column("near_from", "from", 2),
     Column("near_to", "to", 2),
@@ -272,26 +375,29 @@ _COMPARED_COLUMNS = (
 def compared(results: Results) -> ShownTable:
     """Put the paper's Tables 5 to 7 beside what the runs of the study find."""
     rows: list[Row] = []
-    values = results.tables.get("values", pd.DataFrame())
+    values = results.tables.get("values", pd.DataFrame({"reading": []}))
+    shown = [TEXT, *values.loc[values["reading"] != TEXT, "reading"].unique()[:1]]
+    values = values[values["reading"].isin(shown)]
     for (reading, case, quantity), runs in (
         values.groupby(["reading", "case", "quantity"], sort=False) if len(values) else ()
     ):
         first, row = runs.iloc[0], {"case": case, "quantity": quantity, "reading": reading}
         row |= {name: first[name] for name in ("unit", "target", "printed_from", "printed_to")}
         row |= {f"error_{end}_percent": first[f"printed_error_{end}"] for end in ("from", "to")}
-        row |= {"runs": len(runs), **{f"p{p}": runs["value"].quantile(p / 100) for p in (25, 75)}}
+        row["runs"] = len(runs)
         medians = median_with_limits(runs["error"].to_numpy(float))
         row |= zip((f"median_{n}_percent" for n in ("error", "from", "to")), medians, strict=True)
         near = share_with_limits(int(runs["near"].sum()), len(runs))
         row |= zip(("near_share", "near_from", "near_to"), near, strict=True)
-        verdict = by_interval(*near[1:]) if first["encodable"] else "its genes lack the value"
-        rows.append(row | {"verdict": verdict if first["determined"] else UNDECIDED})
+        verdict = by_interval(*near[1:]) if first["encodable"] else f"{reading} cannot write it"
+        rows.append(row | {"verdict": verdict if first["determined"] else UNIDENTIFIABLE})
     caption = (
-        "The paper's Tables 5 to 7 beside the runs of this study, by readings of the paper. The "
+        "The paper's Tables 5 to 7 beside the runs of this study, with the two digits that the "
+        "text describes and with the encoding that judges the claims. The "
         "paper's value from and to: what is printed so with the printed error. Errors of a run are "
         "absolute; their median has its 95 % interval. Near: within "
-        f"{NEAR:.0%} of the paper's value, with 95 % limits, by which the verdict is; it cannot be "
-        "told where no trace determines the quantity."
+        f"{NEAR:.0%} of the paper's value, with 95 % limits, by which the verdict is; limits "
+        "are of seeds alone. Not identifiable: no trace determines the quantity."
     )
     return ShownTable(caption, _COMPARED_COLUMNS, rows)
 
@@ -305,7 +411,7 @@ def read_results(
 ) -> Results:
     """Read the tables of a study, and the runs on the paper's cases, of files in their order.
 
-    Runs under readings of the paper are in files named like their case.
+    Runs under readings of the paper are in files named like these, in folders of their case.
     """
     tables = {file.stem: RowFile("a table", words=None).read(file) for file in files}
     add_columns(tables)
@@ -314,10 +420,10 @@ def read_results(
     runs: dict[str, list[pd.DataFrame]] = {}
     for case, found, best in zip(study.cases.values(), identifications, histories, strict=True):
         if study.shown_method.name == "genetic":
-            for at, own in read_runs(case, found, best).items():
-                others = [file for file in read if file.stem == case.name and not at]
-                both = [own.assign(able=False)]
-                both += [read_reading(study, tables["readings"], file) for file in others]
+            for at, runs_of_text in read_runs(case, found, best).items():
+                others = [file for file in read if file.parent.name == case.name and not at]
+                both = [runs_of_text.assign(judging=not others)]
+                both += [read_reading(study, tables.get("readings"), file) for file in others]
                 every = pd.concat(both, ignore_index=True).assign(case=case.name)
                 if not at:
                     runs.setdefault("runs", []).append(every)
@@ -331,15 +437,16 @@ def read_results(
     return Results(study, tables)
 
 
-def read_reading(study: Study, readings: pd.DataFrame, file: Path) -> pd.DataFrame:
-    """Return the runs of a case under the reading that can print the most of the paper's values."""
-    best = readings["with_error"].idxmax()
-    name, block = list(study.config.readings.items())[best]
-    found = read_readings(file, study.cases[file.stem])
-    found = found[found["reading"] == name].copy()
-    found["near_noise"] = near_noise(found, study.near_noise_tolerance)
-    holds = readings.loc[best, "with_error"] == readings.loc[best, "values"]
-    return found.assign(able=True, reading=block.title, encodable=holds)
+def read_reading(study: Study, compared: pd.DataFrame | None, file: Path) -> pd.DataFrame:
+    """Return the runs of a case under a reading; they judge unless its likelihood excludes it."""
+    title = study.config.readings[file.stem].title
+    found = read_readings(file, study.cases[file.parent.name])
+    excluded = (
+        compared is not None
+        and title in compared.loc[compared["verdict"] == EXCLUDED, "reading"].to_numpy()
+    )
+    near = near_noise(found, study.near_noise_tolerance)
+    return found.assign(near_noise=near, judging=not excluded, reading=title)
 
 
 def add_columns(tables: dict[str, pd.DataFrame]) -> None:
@@ -357,37 +464,34 @@ def add_columns(tables: dict[str, pd.DataFrame]) -> None:
         # Where there is one method alone there is nothing to compare.
         several = tables["methods"]["method"].nunique() > 1
         tables["methods"]["apart"] = apart if several else np.nan
-    if "robustness_gripper" in tables:
-        sweep = tables["robustness_gripper"]
-        bounds = sweep.groupby(["case", "quantity"])["bound_percent"]
-        sweep["bound_change"] = bounds.transform("max") / bounds.transform("min")
     if "robustness_noise" in tables:
         sweep = tables["robustness_noise"]
         noisy = sweep[sweep["row"] > 0]
-        tables["slopes"] = pd.DataFrame(
-            {"case": case, "quantity": quantity, **_slope(rows)}
+        tables["by_noise"] = pd.DataFrame(
+            {"case": case, "quantity": quantity, **_by_noise(rows)}
             for (case, quantity), rows in noisy.groupby(["case", "quantity"], sort=False)
         )
     if "models" in tables:
         models = tables["models"]
-        makers = models[models["model"].str.endswith("(made the traces)")].set_index("case")
-        models["simpler"] = models["parameters"] < models["case"].map(makers["parameters"])
-        models["for_maker"] = models["case"].map(makers["chosen_by_bic"])
+        models["made"] = models["model"].str.endswith("(made the traces)")
+        made = models[models["made"]].set_index("case")["parameters"]
+        simpler = models[models["parameters"] < models["case"].map(made)].groupby("case")
+        models["simpler"] = models["case"].map(simpler.size())
+        refuted = simpler["median_delta_bic"].agg(lambda rise: (rise > REFUTED).sum())
+        models["refuted"] = models["case"].map(refuted)
 
 
-def _slope(rows: pd.DataFrame) -> Row:
-    """Return the exponent with which errors grow with the noise, and their size beside bounds."""
-    noise, error = np.log(rows[["row", "error_genetic"]].to_numpy(float).T)
-    (slope, _), spread = np.polyfit(noise, error, 1, cov=True)
-    wide = 1.96 * float(np.sqrt(spread[0, 0]))
-    # Rounded, for errors that do not change at all leave rounding.
-    ends = [round(end, 2) + 0.0 for end in (slope, slope - wide, slope + wide)]
-    # The median absolute error of an unbiased Gaussian estimate is 0.6745 standard deviations.
-    over = (rows["error_genetic"] / (0.6745 * rows["bound_percent"])).median()
+def _by_noise(rows: pd.DataFrame) -> Row:
+    """Return errors at the least, the paper's and the most noise, their power, and the worst ratio.
+
+    The ratio is to the median absolute error that noise allows, 0.6745 bounds.
+    """
     at = rows.groupby("row")["error_genetic"].median()
-    sizes = {"over_bound": over, "first": at.iloc[0], "last": at.iloc[-1]}
-    sizes |= {"first_noise": at.index[0], "last_noise": at.index[-1]}
-    return dict(zip(("slope", "slope_from", "slope_to"), ends, strict=True)) | sizes
+    power = np.polyfit(np.log(at.index), np.log(at), 1)[0]
+    over = (rows["error_genetic"] / (0.6745 * rows["bound_percent"])).groupby(rows["row"]).median()
+    sizes = {"first": at.iloc[0], "last": at.iloc[-1], "paper": at.get(100 * PAPERS_NOISE, np.nan)}
+    ends = {"first_noise": at.index[0], "last_noise": at.index[-1], "over_bound": over.max()}
+    return {"power": round(power, 2) + 0.0} | sizes | ends
 
 
 def read_runs(case: Case, identifications: Path, histories: Path) -> dict[str, pd.DataFrame]:
@@ -404,7 +508,7 @@ def read_runs(case: Case, identifications: Path, histories: Path) -> dict[str, p
     found = found.assign(last_improvement=found["seed"].map(falls))
     # Of a run that has stopped before, the last generation.
     at_20 = best[best["generation"] <= 20].groupby("seed", as_index=False).last()
-    return {"": found.assign(reading=OWN), " at 20": at_20.assign(reading=OWN)}
+    return {"": found.assign(reading=TEXT), " at 20": at_20.assign(reading=TEXT)}
 
 
 def values_of(case: Case, runs: pd.DataFrame, tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
@@ -426,21 +530,20 @@ def values_of(case: Case, runs: pd.DataFrame, tables: Mapping[str, pd.DataFrame]
         least = 0.0 if ends[0] <= truth <= ends[1] else min(sizes)
         values = runs[names].sum(axis=1)
         # Sums have many ways to be made.
-        own = len(names) > 1 or bool(held.get(names[0], False))
+        written = len(names) > 1 or bool(held.get(names[0], False))
         columns = {
             "value": values,
             "error": 100 * abs(values / truth - 1),
             "decades": abs(np.log10(values.clip(lower=1e-300) / truth)),
             "near": abs(values / paper - 1) <= NEAR,
-            "encodable": runs["encodable"].where(runs["able"], own) if runs["able"].any() else own,
+            "encodable": (runs["reading"] != TEXT) | written,
         }
         head = {"quantity": label, "unit": quantity[0].unit, "target": truth}
         head |= {"printed_from": ends[0], "printed_to": ends[1], "printed_error_from": least}
         head |= {"printed_error_to": max(sizes), "sum": len(names) > 1}
         head |= {"determined": expected["expected_verdict"][label] == DETERMINED}
         head |= {"expected_high": expected["expected_high"][label]}
-        head |= {"noise_percent": 100 * case.noise.level}
-        kept = runs[["case", "seed", "reading", "able"]]
+        kept = runs.filter(["case", "seed", "reading", "judging", "near_noise"])
         rows.append(kept.assign(**head, **columns))
     return pd.concat(rows)
 

@@ -174,22 +174,25 @@ def sampling_evidence(study: Study) -> ShownTable:
     ]
     if found:
         table = np.array([cells[2:] for cells in found], dtype=float)
-        errors, bounds = table[:, :1], table[:, 3:]
+        errors, ends, bounds = table[:, :1], table[:, 1:3], table[:, 3:]
         ratios = np.sqrt(np.mean((errors / bounds) ** 2, axis=0))
         found.append(("all", "error / bound", None, None, None, *ratios))
         near = bounds[:, _RATES_HZ.index(_NEAR)]
-        tails = chdtri(len(errors), [(1 + _MIDDLE) / 2, (1 - _MIDDLE) / 2])
-        rates = _NEAR * tails / np.sum((errors[:, 0] / near) ** 2)
-        found.append(("all", "rates (Hz)", None, *rates))
+        fine = np.ptp(ends, axis=1) <= near
+        least = np.where(ends.prod(axis=1) < 0, 0.0, np.abs(ends).min(axis=1))
+        sums = [np.sum((sizes / near)[fine] ** 2) for sizes in (np.abs(ends).max(axis=1), least)]
+        tails = chdtri(np.sum(fine), [(1 + _MIDDLE) / 2, (1 - _MIDDLE) / 2])
+        found.append(("all", "rates (Hz)", None, *(_NEAR * tails / sums)))
     caption = (
         "The paper's errors, with what value and printed error leave of them, beside the standard "
         "deviations that the study's noise leaves at least (Cramer-Rao bounds at the true "
         "parameters), at several sampling rates. Of c and c_p the sum stands where they trade "
         "against each other at the paper's answer. Last rows: the paper's error over the bound, "
         "root mean square over the rows above, of which about 1 is to be expected of an "
-        "identification that is as good as noise allows; and the lowest and highest rate at which "
-        f"chi-squared of the errors is in the middle {_MIDDLE:.0%}, bounds taken from {_NEAR:g} Hz "
-        "with the root of the rate."
+        "identification that is as good as noise allows; and, given Gaussian noise of this level, "
+        "the lowest and highest rate at which chi-squared of any errors from their least to their "
+        f"largest is in the middle {_MIDDLE:.0%}, bounds taken from {_NEAR:g} Hz with the root of "
+        "the rate. Rows whose digits leave more than a bound are left out of it."
     )
     names = [column.name for column in _SAMPLING_COLUMNS]
     rows = [dict(zip(names, cells, strict=False)) for cells in found]

@@ -28,35 +28,37 @@ if TYPE_CHECKING:
 
 _ENOUGH = 10.0
 """Error in percent within which an estimate is good enough."""
-_MIDDLE = 1.96
-"""Standard deviations that hold 95 % of the estimates."""
-
 _COLUMNS = (
     *titled("case", "quantity", "unit"),
     Column("target", "Target", 4),
     Column("lowest_force_uN", "Lowest jaw force (µN)", 2),
     Column("readings", "Readings"),
     Column("noise_urad", "Noise (µrad)"),
-    Column("bound_percent", "Bound %", 2),
+    Column("density_nrad", "Noise density (nrad/√Hz)", 3),
+    Column("bound_percent", "Bound, rest known %", 2),
+    Column("bound_same_density_percent", "at the paper's noise density", 2),
     Column("seeds", "Seeds"),
     Column("median_error_percent", "Median abs. error %", 2),
     Column("enough_share", f"Share within {_ENOUGH:g} %", 3),
     Column("enough_from", "95 % from", 3),
     Column("enough_to", "to", 3),
-    Column("noise_for_enough_urad", "Noise for 95 % (µrad)", 2),
-    Column("readings_for_enough", "Readings for 95 %, times", 2),
 )
 
 
 def protocols(study: Study, identifications: list[Path]) -> ShownTable:
     """Compare what traces of every protocol tell, by bounds and by blind identifications."""
-    rows = [row for case, found in _pairs(study, identifications) for row in _rows(case, found)]
+    rows, density = list[Row](), 1.0
+    for case, found in _pairs(study, identifications):
+        noise = _noise_rad(case) / np.sqrt(case.block.measurement.rate_Hz)
+        density = noise if case.published.table else density
+        rows += _rows(case, found, noise, density)
     caption = (
         "The paper's samples under its own protocol and under others: the lowest force of the "
-        "jaws, negative where they would have to pull; the Cramér-Rao bound at the case's noise; "
-        f"and blind identifications by {study.shown_method.title}, all parameters unknown. Noise "
-        f"and multiple of the readings at which, by the bound, 95 % of the estimates are within "
-        f"{_ENOUGH:g} %. Left out: quantities that have no bound under any protocol."
+        "jaws, negative where they would have to pull; the Cramér-Rao bound at the case's noise, "
+        "parameters without information known, and at the noise density that the sample's trace "
+        "has under the paper's protocol, whatever the rate; "
+        f"and blind identifications by {study.shown_method.title}, all parameters unknown. "
+        "Left out: quantities that have no bound under any protocol."
     )
     return ShownTable(caption, _COLUMNS, rows)
 
@@ -75,12 +77,19 @@ def _pairs(study: Study, identifications: list[Path]) -> list[tuple[Case, pd.Dat
     return sorted(both, key=lambda it: (known.index(it[0].parameters), not it[0].published.table))
 
 
-def _rows(case: Case, found: pd.DataFrame) -> Iterator[Row]:
-    """Yield a row of every quantity that traces may determine."""
-    given = case.gripper, case.network, case.torque
-    target = simulated_response(*given, case.times_s)[0]
-    noise = float(np.mean(standard_deviation(target, case.noise)))
-    grip = compute_grip(*given)
+def _noise_rad(case: Case) -> float:
+    """Return the standard deviation of a reading's noise."""
+    device = case.gripper, case.network, case.torque
+    target = simulated_response(*device, case.times_s)[0]
+    return float(np.mean(standard_deviation(target, case.noise)))
+
+
+def _rows(case: Case, found: pd.DataFrame, density: float, papers: float) -> Iterator[Row]:
+    """Yield a row of every quantity that traces may determine.
+
+    Densities of the noise, rad/√Hz, are the case's and that under the paper's protocol.
+    """
+    grip = compute_grip(case.gripper, case.network, case.torque)
     searched = case.experiment.searched.parameters
     bounds = bounds_percent(case.experiment, case.noise, case.parameters, case.times_s)
     for quantity, bound in bounds:
@@ -91,7 +100,6 @@ def _rows(case: Case, found: pd.DataFrame) -> Iterator[Row]:
         values = found[[member.column for member in members]].sum(axis=1).to_numpy(float)
         errors = 100 * np.abs(values / truth - 1)
         shares = share_with_limits(int(np.sum(errors <= _ENOUGH)), len(errors))
-        needed = _ENOUGH / (_MIDDLE * bound)
         yield {
             "case": case.title,
             "quantity": quantity.label,
@@ -99,13 +107,13 @@ def _rows(case: Case, found: pd.DataFrame) -> Iterator[Row]:
             "target": truth,
             "lowest_force_uN": 1e6 * grip.lowest_N,
             "readings": len(case.times_s),
-            "noise_urad": 1e6 * noise,
+            "noise_urad": 1e6 * _noise_rad(case),
+            "density_nrad": 1e9 * density,
             "bound_percent": bound,
+            "bound_same_density_percent": bound * papers / density,
             "seeds": len(errors),
             "median_error_percent": np.median(errors),
             **dict(zip(("enough_share", "enough_from", "enough_to"), shares, strict=True)),
-            "noise_for_enough_urad": 1e6 * noise * needed,
-            "readings_for_enough": max(1.0, needed**-2),
         }
 
 

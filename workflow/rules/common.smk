@@ -30,7 +30,7 @@ from biogrip.errors import BiogripError
 from biogrip.files import digest_of
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.traces.measurement_block import MeasurementBlock
-from biogrip_study.config.shipped import shipped, software
+from biogrip_study.config.shipped import shipped, study_software
 from biogrip_study.config.study import load_given_study
 from biogrip_study.methods.registry import METHODS
 from biogrip_study.stages.job import CASE_KEYS, STUDY_KEYS, batch_names, keys_of_cases, settings
@@ -51,7 +51,7 @@ CONFIGS = [Path(file) for file in workflow.configfiles]
 KNOWN = {*config, "__use_yte__"}
 CONFIGS = [it for it in CONFIGS if KNOWN & {*yaml.safe_load(it.read_text("utf-8"))}]
 STUDY = usable(load_given_study, config, CONFIGS)
-SOFTWARE = software()
+SOFTWARE = study_software()
 # Config keys, of which each rule names those that its jobs use: what is controlled and read, and
 # of which sample; what a fit assumes besides; when a simulated trace is sampled; its noise; and
 # columns of a recorded trace.
@@ -109,12 +109,18 @@ def names(cases):
     return "|".join(cases) or "(?!)"
 
 
+def trades(case):
+    """True if two exchangeable parameters are searched, and others besides."""
+    pair = {*case.sample.model.exchangeable}
+    return len(pair) == 2 and pair < {parameter.name for parameter in case.block.searched}
+
+
 # Cases that have what only some have, those of sweeps' points among them.
 SIMULATED = [*STUDY.simulated, *STUDY.points]
 EVERY = [*STUDY.cases, *STUDY.points]
 CALIBRATED = [n for n in EVERY if STUDY.case(n).block.assumed_gripper == "calibrated"]
 SELECTING = list(STUDY.cases) if STUDY.config.model_selection.models else []
-ANSWERED = [name for name in STUDY.gripped if STUDY.case(name).has_valley][-1:]
+ANSWERED = [name for name in STUDY.gripped if trades(STUDY.case(name))][-1:]
 calibration_of = of_case("results/calibrations/{case}.yaml", CALIBRATED)
 
 # Tables and figures of the study, of what there is in it, and those of a case.
@@ -131,7 +137,7 @@ EVIDENCE = ["evidence", "printed_values", "sampling_evidence"]
 OTHER_TABLES = [*INPUTS, *(["contact", "left_out"] if HAS_GRIPPER else [])]
 OTHER_TABLES += ["linearisation", "mechanics", "contact_loss"] if STUDY.gripped else []
 OTHER_TABLES += ["claims", "tables_5_to_7", *EVIDENCE] if STUDY.published else []
-OTHER_TABLES += ["readings", "readings_found"] * bool(STUDY.config.readings)
+OTHER_TABLES += ["readings", "readings_found"] * (len(STUDY.config.readings) > 1)
 # The paper's samples under other protocols, and these under its own.
 KNOWN = [STUDY.case(name).parameters for name in STUDY.published]
 OTHERS = [
@@ -139,17 +145,23 @@ OTHERS = [
 ]
 OTHER_TABLES += ["protocols"] * bool(OTHERS)
 GRIPPER_FIGURES = ["comb", "linkage", "torque"] if HAS_GRIPPER else []
-PAPER_FIGURES = ["protocols"] * bool(OTHERS)
+PAPER_FIGURES = ["protocols"] * bool(OTHERS) + ["referee"] * (len(STUDY.config.readings) > 1)
 FIGURES = ["answer"] if ANSWERED else []
 FIGURES += ["moduli", "overview"] if STUDY.simulated else []
-
-
-def case_figure_names(simulated, valley):
-    """Names of the figures of a case, by whether it is simulated, and searched for c and c_p."""
-    drawn = ["convergence", "evolution", "fit", "judged_fit", "profiles"]
-    drawn += ["force", "scatter", "waterfall"] if simulated else []
-    return drawn + ["valley"] if valley else drawn
-
+# Those of a case, with the functions that draw them, and the first cases, as many as a page shows.
+OF_EVERY_CASE = {
+    "convergence": "biogrip_study.figures.course.draw_convergence",
+    "evolution": "biogrip_study.figures.course.draw_evolution",
+    "fit": "biogrip_study.figures.case_fit.draw_fits",
+    "judged_fit": "biogrip_study.figures.case_fit.draw_judged_fit",
+    "profiles": "biogrip_study.figures.case_fit.draw_profiles",
+}
+OF_SIMULATED = {
+    "force": "biogrip_study.figures.case_fit.draw_force",
+    "scatter": "biogrip_study.figures.course.draw_scatter",
+    "waterfall": "biogrip_study.figures.course.draw_waterfall",
+}
+FIRST = STUDY.of(STUDY.simulated[:3])
 
 # All of them with the case or the sweep that they are of.
 SHOWN = {
@@ -162,11 +174,10 @@ SHOWN = {
         *((name, "") for name in [*GRIPPER_FIGURES, *PAPER_FIGURES, *FIGURES]),
         *(("linearisation", "") for _ in STUDY.gripped[:1]),
         *(
-            (name, case)
-            for case, its in STUDY.cases.items()
-            for name in case_figure_names(not its.recorded, its.has_valley)
+            (name, name_of_case)
+            for name_of_case, case in STUDY.cases.items()
+            for name in [*OF_EVERY_CASE, *([] if case.recorded else OF_SIMULATED)]
         ),
-        *(("robustness", sweep) for sweep in STUDY.config.sweeps),
     ],
 }
 

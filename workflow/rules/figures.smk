@@ -1,14 +1,7 @@
-"""The figures: of each case with its summary, and of the study; and the page with all of them."""
+"""The figures: of each case, and of the study; what its trace tells; and the page with all."""
 
 
-def case_figures(simulated, valley):
-    """The files of the figures of a case, and its summary."""
-    drawn = case_figure_names(simulated, valley)
-    summary = shown("results/summaries/{case}.html", "pages", "summary", "{case}")
-    return [*(file for name in drawn for file in drawing(name, "{case}")), summary]
-
-
-# Of a recorded trace nobody knows the target; a valley has who searches for c and c_p.
+# Of a recorded trace nobody knows the target.
 rule case_figures:
     input:
         identifications="results/identifications/{case}.csv",
@@ -19,66 +12,113 @@ rule case_figures:
         target=of_case("results/targets/{case}.csv", STUDY.simulated),
         calibrated=calibration_of,
     output:
-        *case_figures(simulated=True, valley=True),
+        **{name: drawing(name, "{case}") for name in [*OF_EVERY_CASE, *OF_SIMULATED]},
     log:
         "results/logs/case_figures/{case}.log",
     benchmark:
         "results/benchmarks/case_figures/{case}.tsv"
     wildcard_constraints:
-        case=names(case for case in STUDY.simulated if STUDY.case(case).has_valley),
+        case=names(STUDY.simulated),
     params:
         **settings_of(
             *"actuator methods seeds evaluation title published contact models".split(),
             *("genetic_algorithm", "identifiability.confidence", *FIT, *SAMPLING, NOISE),
         ),
+        stages=[*OF_EVERY_CASE.values(), *OF_SIMULATED.values()],
     message:
         "Drawing {wildcards.case}"
     script:
-        "../scripts/case_figures.py"
-
-
-use rule case_figures as case_figures_without_valley with:
-    output:
-        *case_figures(simulated=True, valley=False),
-    wildcard_constraints:
-        case=names(case for case in STUDY.simulated if not STUDY.case(case).has_valley),
+        "../scripts/figures.py"
 
 
 use rule case_figures as recorded_case_figures with:
     output:
-        *case_figures(simulated=False, valley=True),
+        **{name: drawing(name, "{case}") for name in OF_EVERY_CASE},
     wildcard_constraints:
-        case=names(case for case in STUDY.recorded if STUDY.case(case).has_valley),
+        case=names(STUDY.recorded),
+    params:
+        stages=[*OF_EVERY_CASE.values()],
 
 
-use rule case_figures as recorded_case_figures_without_valley with:
-    output:
-        *case_figures(simulated=False, valley=False),
-    wildcard_constraints:
-        case=names(case for case in STUDY.recorded if not STUDY.case(case).has_valley),
-
-
-rule figures:
+rule summary:
     input:
-        identifications=files("results/identifications/{case}.csv", STUDY.simulated),
-        targets=files("results/targets/{case}.csv", STUDY.simulated),
-        expected=files("results/identifiability/expected/{case}.json", STUDY.simulated),
-        measurements=files("results/measurements/{case}/{batch}.npz", STUDY.simulated[:1]),
-        calibrated=files("results/calibrations/{case}.yaml", CALIBRATED),
-        answered=[*files("results/identifiability/{case}.json", ANSWERED), *first_traces(ANSWERED)],
+        verdicts="results/identifiability/{case}.json",
+        judged_fit="results/figures/judged_fit_{case}.png",
+        profiles="results/figures/profiles_{case}.png",
     output:
-        **{name: drawing(name) for name in FIGURES},
+        summary=shown("results/summaries/{case}.html", "pages", "summary", "{case}"),
     log:
-        "results/logs/figures.log",
-    benchmark:
-        "results/benchmarks/figures.tsv"
+        "results/logs/summary/{case}.log",
+    params:
+        **settings_of("title", *SAMPLE),
+        stages=["biogrip_study.page.page.write_summary"],
+    message:
+        "Summing up what the judged trace of {wildcards.case} tells"
+    script:
+        "../scripts/stage.py"
+
+
+rule answer:
+    input:
+        verdicts=files("results/identifiability/{case}.json", ANSWERED),
+        measurements=first_traces(ANSWERED),
+        calibrated=files(
+            "results/calibrations/{case}.yaml", [name for name in ANSWERED if name in CALIBRATED]
+        ),
+    output:
+        answer=drawing("answer"),
+    log:
+        "results/logs/answer.log",
+    params:
+        **settings_of("actuator", *keys_of_cases(STUDY.of(ANSWERED), *FIT)),
+        stages=["biogrip_study.figures.overview.draw_answer"],
+    message:
+        "Drawing what a trace tells"
+    script:
+        "../scripts/figures.py"
+
+
+rule moduli:
+    input:
+        identifications=files("results/identifications/{case}.csv", FIRST.cases),
+        targets=files("results/targets/{case}.csv", FIRST.cases),
+    output:
+        moduli=drawing("moduli"),
+    log:
+        "results/logs/moduli.log",
     params:
         **settings_of(
-            *"methods seeds evaluation actuator gripper protocol".split(),
-            *keys_of_cases(STUDY, *FIT, "title", "published", *SAMPLING, NOISE),
+            *("methods", "seeds", "evaluation", "actuator"),
+            *keys_of_cases(FIRST, *FIT, "title", *SAMPLING, NOISE),
         ),
+        stages=["biogrip_study.figures.overview.draw_moduli"],
     message:
-        "Drawing the figures of the study"
+        "Drawing the moduli of the fits"
+    script:
+        "../scripts/figures.py"
+
+
+rule overview:
+    input:
+        identifications=files("results/identifications/{case}.csv", FIRST.cases),
+        expected=files("results/identifiability/expected/{case}.json", FIRST.cases),
+        measurements=files("results/measurements/{case}/{batch}.npz", STUDY.simulated[:1]),
+        calibrated=files(
+            "results/calibrations/{case}.yaml",
+            [name for name in STUDY.simulated[:1] if name in CALIBRATED],
+        ),
+    output:
+        overview=drawing("overview"),
+    log:
+        "results/logs/overview.log",
+    params:
+        **settings_of(
+            *("methods", "seeds", "evaluation", "actuator"),
+            *keys_of_cases(FIRST, *FIT, "title", "published"),
+        ),
+        stages=["biogrip_study.figures.overview.draw_overview"],
+    message:
+        "Drawing the study at a glance"
     script:
         "../scripts/figures.py"
 

@@ -2,7 +2,7 @@
 
 
 def points(sweep):
-    """The names of the points of a sweep, cases of their own that the rules of the study identify."""
+    """The names of the points of a sweep, cases of their own which the study identifies."""
     block = STUDY.config.sweeps[sweep]
     return [point.name for case in block.cases for point in block.points(sweep, case)]
 
@@ -20,7 +20,6 @@ rule sweep:
         points="results/robustness/{sweep}.csv",
         table="results/tables/robustness_{sweep}.csv",
         page=page_of_table("robustness", "{sweep}"),
-        figure=drawing("robustness", "{sweep}"),
     log:
         "results/logs/sweep/{sweep}.log",
     benchmark:
@@ -32,11 +31,11 @@ rule sweep:
             *keys_of_cases(STUDY, *CASE_KEYS),
         ),
         stages=[
-            *("biogrip_study.tables.sweeps.judge", "biogrip_study.tables.sweeps.write_robustness"),
-            "biogrip_study.figures.overview.save_robustness",
+            "biogrip_study.tables.sweeps.judge_points",
+            "biogrip_study.tables.sweeps.robustness",
         ],
     message:
-        "Judging and drawing the sweep {wildcards.sweep}"
+        "Judging the sweep {wildcards.sweep}"
     script:
         "../scripts/stage.py"
 

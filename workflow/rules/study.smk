@@ -10,7 +10,7 @@ rule target:
         case=names(SIMULATED),
     params:
         **settings_of("actuator", "gripper", "contact", "models", *SAMPLE, *SAMPLING),
-        stages=["biogrip_study.stages.targets.simulate"],
+        stages=["biogrip_study.stages.targets.simulate_target"],
     message:
         "Simulating the response of {wildcards.case}"
     script:
@@ -90,8 +90,8 @@ rule identification:
         runtime=120,
     params:
         **settings_of("study_seed", "actuator", *FIT),
-        method=lambda wildcards: settings(STUDY, METHODS[wildcards.method].settings, wildcards.case),
-        stages=["biogrip_study.stages.identification.identify"],
+        method=lambda wildcards: settings(STUDY, [METHODS[wildcards.method].key], wildcards.case),
+        stages=["biogrip_study.stages.identification.identify_seeds"],
     message:
         "Identifying {wildcards.case} by {wildcards.method}, {wildcards.batch}"
     script:
@@ -157,7 +157,7 @@ rule intervals:
             *("study_seed", "actuator", *FIT, *SAMPLING, NOISE, "least_squares"),
             *("identifiability.confidence", "identifiability.verdicts_every"),
         ),
-        stages=["biogrip_study.stages.judgement.estimate"],
+        stages=["biogrip_study.stages.judgement.estimate_intervals"],
     message:
         "Estimating intervals of {wildcards.case}, {wildcards.batch}"
     script:

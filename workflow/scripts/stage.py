@@ -1,11 +1,13 @@
-"""Do the stages that the rule names: functions, by their full names."""
+"""Do the stages that the rule names, functions by their full names; a table is written."""
 
-from importlib import import_module
+from pathlib import Path
 
-from biogrip_study.stages.job import arguments, logged
+from biogrip_study.stages.job import called, logged
 
 with logged(snakemake):
     for stage in snakemake.params.stages:
-        module, _, name = stage.rpartition(".")
-        function = getattr(import_module(module), name)
-        function(**arguments(snakemake, function))
+        if table := called(stage, snakemake):
+            # Imported here: most stages write their files themselves, and load no pandas.
+            from biogrip_study.tables.layout import write
+
+            write(table, Path(snakemake.output.table))

@@ -269,11 +269,11 @@ def identify_batch(
                 write_result(outputs[index], results[index], made_from[index])
             if index in results and drawn:
                 # Imported here: loading Matplotlib takes long.
-                from biogrip.command.page import draw
+                from biogrip.command.page import trace_pictures
 
                 # What is found counts without a picture, too.
                 with _caught(trace, {}):
-                    outcome.pictures[trace.name] = draw(diagnosis, results[index])
+                    outcome.pictures[trace.name] = trace_pictures(diagnosis, results[index])
     outcome.found.extend(results[index] for index in sorted(results))
     names = [trace.name for trace in asked]
     outcome.refused.update((name, refused[name]) for name in names if name in refused)

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from biogrip.config.case import SampleCase
-from biogrip.config.source import HOLD
+from biogrip.config.source import HOLD, RAMP
 from biogrip.digits import plain
 from biogrip.identify.other_fits import Trace
-from biogrip.traces.columns import held_unit
+from biogrip.traces.columns import held_unit, shape_and_sizes
 from biogrip.traces.reader import Recording
 
 # Share of the largest load so far below which a contact shrinks, not only scatters.
@@ -32,24 +32,27 @@ def load_in_words(trace: Trace, case: SampleCase, given: Mapping[str, Any]) -> s
         what = _with_unit(high if low == high else f"{low} to {high}", column["unit"])
         count = np.count_nonzero(recording.load[:, 0] >= start_s)
         rows = f"column {column['column']}, {count:,} rows"
-        return f"Load: {what} from {start_s:g} s ({rows}){_contact(case)}."
+        return f"Load: {what} from {start_s:g} s ({rows}){_shape(case)}."
     if HOLD[0] not in given:
         return ""
     number, unit = held_unit(given[HOLD[0]], controlled)
     start = "its start, as fitted," if experiment.fit_start else f"{start_s:g} s"
     what = f"{_with_unit(f'{number:g}', unit)} from {start} to {recording.form['last_s']:g} s"
-    return f"Held: {what}{_contact(case)}."
+    rise = f", reached within {given[RAMP[0]]:g} s" if RAMP[0] in given else ""
+    return f"Held: {what}{rise}{_shape(case)}."
 
 
-def _contact(case: SampleCase) -> str:
-    """Return what turns a force and an indentation into a stress and a strain."""
-    sphere = case.block.measurement.sphere
-    return f", by Hertz's contact with a sphere of radius {sphere}" if sphere else ""
+def _shape(case: SampleCase) -> str:
+    """Return what turns a load and a depth into a stress and a strain."""
+    if (text := case.block.measurement.shape) is None:
+        return ""
+    return f", by the shape {text} ({shape_and_sizes(text)[0].source})"
 
 
 def _shrinks(recording: Recording, case: SampleCase) -> tuple[str, ...]:
-    """Return a sentence if a sphere was drawn back, where Hertz's contact has no such sum."""
-    if recording.load is None or case.block.measurement.sphere is None:
+    """Return a sentence if a tip was drawn back, where its contact has no such sum."""
+    instrument = case.block.measurement.instrument
+    if recording.load is None or instrument.read.power == instrument.controlled.power == 1:
         return ()
     time_s, loads = recording.load[recording.load[:, 0] <= recording.form["last_s"]].T
     most = np.maximum.accumulate(loads)
@@ -69,7 +72,7 @@ def _with_unit(number: str, unit: str) -> str:
 def remarks_on_hold(
     recording: Recording, case: SampleCase, given: Mapping[str, Any]
 ) -> tuple[str, ...]:
-    """Return a sentence if a sphere was drawn back, or what was held may be in another unit.
+    """Return a sentence if a tip was drawn back, or what was held may be in another unit.
 
     That is if readings have a unit with a prefix, and what was held is a number.
     """

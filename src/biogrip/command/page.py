@@ -37,16 +37,16 @@ from biogrip.physics.protocol import evaluate, hold, join_phases
 from biogrip.physics.simulation import simulated_response
 from biogrip.terminal import visible_lines
 
-_MARKS = {OK: "✓", DOUBTFUL: "!", REJECTED: "✕"}
+_STATUS_MARKS = {OK: "✓", DOUBTFUL: "!", REJECTED: "✕"}
 # Most groups of a column that a figure shows, and the word of all traces where there is no such.
-_MOST_GROUPS, _ALL, _MOST_PANELS = 6, "all traces", 6
+_GROUPS_SHOWN, _ALL, _MOST_PANELS = 6, "all traces", 6
 # Most traces whose pictures are open, and printed.
 _MOST_OPEN = 3
 # Times at which a level is drawn.
 _BAND = 25
 
 
-def draw(diagnosis: Diagnosis, data: Mapping[str, Any]) -> list[str]:
+def trace_pictures(diagnosis: Diagnosis, data: Mapping[str, Any]) -> list[str]:
     """Return pictures of a trace as data URLs: the fit with its residuals, and all profiles.
 
     A third one is of the level over time, as far as that is told without a model.
@@ -54,7 +54,7 @@ def draw(diagnosis: Diagnosis, data: Mapping[str, Any]) -> list[str]:
     drawn = draw_best(diagnosis)
     with style.styled():
         more = [draw_level(diagnosis, data)] if data["without_model"]["quantities"] else []
-        return [_address(each) for each in (drawn, draw_profiles_of(data), *more)]
+        return [_address(picture) for picture in (drawn, draw_profiles_of(data), *more)]
 
 
 def draw_level(diagnosis: Diagnosis, data: Mapping[str, Any]) -> Figure:
@@ -72,7 +72,7 @@ def draw_level(diagnosis: Diagnosis, data: Mapping[str, Any]) -> Figure:
     turned = level_turned(diagnosis.likelihood.problem.residuals) or (lambda response: response)
     drawn = style.figure(style.COLUMN_IN, 2.4)
     axes = drawn.subplots()
-    low, high = np.array([(it.low, it.high) for it in told], dtype=float).T
+    low, high = np.array([(level.low, level.high) for level in told], dtype=float).T
     axes.fill_between(times, low, high, color=style.SHADE, label="any linear sample")
     axes.plot(times, turned(best), "--", color=style.FITTED, label="best fit")
     after = recording.time_s > 0
@@ -94,8 +94,8 @@ def draw_best(diagnosis: Diagnosis) -> Figure:
     Where readings spread over decades after the protocol's start, time is counted from there.
     """
     recording, experiment = diagnosis.identified
-    found = {finding.quantity.label: finding.value for finding in diagnosis.findings}
-    fit = fit_of(experiment, found, recording.time_s, recording.readings, recording.sd)
+    values = {finding.quantity.label: finding.value for finding in diagnosis.findings}
+    fit = fit_of(experiment, values, recording.time_s, recording.readings, recording.sd)
     start_s = recording.onset_s or 0.0
     spread = style.is_over_decades(fit.time_s)
     if not spread:
@@ -111,37 +111,39 @@ def _address(drawn: Figure) -> str:
     return data_url("image/png", style.png_of(drawn, 64))
 
 
-def draw_traces(outcome: Outcome, columns: Mapping[str, str]) -> tuple[Figure, str]:
+def draw_every_trace(outcome: Outcome, columns: Mapping[str, str]) -> tuple[Figure, str]:
     """Draw quantities of all traces, and return the figure with what its groups are.
 
     Groups are those of the column with the fewest words, units those of one that puts cells of a
     group together.
     """
-    names = dict.fromkeys(name for own in outcome.copied.values() for name in own)
+    names = dict.fromkeys(name for cells in outcome.copied.values() for name in cells)
     none = dict.fromkeys(names, "")
-    every = [_told(it, {**none, **outcome.copied.get(it["trace"], {})}) for it in outcome.found]
-    words_of = {name: {own.words[name] for own in every} for name in every[0].words}
-    few = [name for name, of in words_of.items() if 1 < len(of) <= _MOST_GROUPS and "" not in of]
+    copied = outcome.copied
+    every = [_told_by(data, {**none, **copied.get(data["trace"], {})}) for data in outcome.found]
+    words_of = {name: {told.words[name] for told in every} for name in every[0].words}
+    few = [name for name, of in words_of.items() if 1 < len(of) <= _GROUPS_SHOWN and "" not in of]
     by = min(set(few) - {CELL}, key=lambda name: (len(words_of[name]), name), default=_ALL)
-    shared = sorted(shared_columns(every, by), key=lambda own: not own[1])
+    shared = sorted(shared_columns(every, by), key=lambda column: not column[1])
     unit = shared[0][0] if shared and by != _ALL else None
     confidence = outcome.found[0]["confidence"]
     cells = gather(every, by, unit, confidence)
     groups = sorted({cell.group for cell in cells})
     compared = compare(cells, groups, confidence, units=unit is not None)
-    units = {each["quantity"]: each["unit"] for own in outcome.found for each in own["quantities"]}
+    units = {q["quantity"]: q["unit"] for data in outcome.found for q in data["quantities"]}
     said = f"Groups: {by}. " if by != _ALL else ""
     said += f"Large marks: means of each {unit}." if unit else "Cells are taken for independent."
     # A panel each side by side, as many as a screen has room for.
     width_in = max(style.PAGE_IN, ONE_COLUMN_IN / 2 * min(len(columns), _MOST_PANELS))
-    return draw_cells(cells, compared, {name: units[name] for name in columns}, width_in), said
+    units = {name: units[name] for name in columns}
+    return draw_cells(cells, compared, units, width_in, unit), said
 
 
-def _told(found: Mapping[str, Any], copied: Mapping[str, str]) -> Told:
+def _told_by(data: Mapping[str, Any], copied: Mapping[str, str]) -> Told:
     """Return what a trace tells, with the cells of its row in a table of traces."""
     numbers = ("verdict", "value", "low", "high")
-    told = {each["quantity"]: tuple(map(each.get, numbers)) for each in found["quantities"]}
-    return Told(found["trace"], found["fit"], {**copied, _ALL: "all traces"}, told)
+    told = {q["quantity"]: tuple(map(q.get, numbers)) for q in data["quantities"]}
+    return Told(data["trace"], data["fit"], {**copied, _ALL: "all traces"}, told)
 
 
 def write_page(outcome: Outcome, page: Path) -> None:
@@ -152,15 +154,15 @@ def write_page(outcome: Outcome, page: Path) -> None:
     figure_of_all = groups = ""
     if several and traces:
         with style.styled():
-            drawn, groups = draw_traces(outcome, columns)
+            drawn, groups = draw_every_trace(outcome, columns)
             figure_of_all = _address(drawn)
-    outcomes = [(it["trace"], it["fit"], " ".join(it["reasons"])) for it in traces]
+    outcomes = [(data["trace"], data["fit"], " ".join(data["reasons"])) for data in traces]
     outcomes += [(trace, FAILED, reason) for trace, reason in outcome.refused.items()]
     further = outcome_in_words(outcomes) if several else preferred_in_words(traces[0])
     set_up = together(map(set_up_in_words, traces))
-    assumed: dict[str, dict[str, Any]] = {each["trace"]: each["assumed"] for each in traces}
+    assumed: dict[str, dict[str, Any]] = {data["trace"]: data["assumed"] for data in traces}
     shared = common([*assumed.values()])
-    own = {trace: _as_yaml(beyond(block, shared)) for trace, block in assumed.items()}
+    beyond_shared = {trace: _as_yaml(beyond(block, shared)) for trace, block in assumed.items()}
     text = (
         environment()
         .get_template("traces.html.j2")
@@ -175,12 +177,14 @@ def write_page(outcome: Outcome, page: Path) -> None:
             several=several,
             columns=columns,
             copied=copied,
-            names=list(dict.fromkeys(name for own in copied.values() for name in own)),
+            names=list(dict.fromkeys(name for cells in copied.values() for name in cells)),
             shared=_as_yaml(shared),
-            own=own,
+            own=beyond_shared,
             many=len(traces) > _MOST_OPEN,
-            marks=_MARKS,
-            counts={status: sum(each["fit"] == status for each in traces) for status in _MARKS},
+            marks=_STATUS_MARKS,
+            counts={
+                status: sum(data["fit"] == status for data in traces) for status in _STATUS_MARKS
+            },
             words=words,
             written_by=f"{WRITTEN_BY} {__version__}",
         )
@@ -190,25 +194,25 @@ def write_page(outcome: Outcome, page: Path) -> None:
 
 def common(several: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Return what all of several nested blocks say alike."""
-    found = {}
+    alike = {}
     for key in several[0] if several else ():
-        every: list[Any] = [own.get(key) for own in several]
-        if all(own == every[0] for own in every):
-            found[key] = every[0]
-        elif all(isinstance(own, dict) for own in every) and (alike := common(every)):
-            found[key] = alike
-    return found
+        every: list[Any] = [block.get(key) for block in several]
+        if all(value == every[0] for value in every):
+            alike[key] = every[0]
+        elif all(isinstance(value, dict) for value in every) and (inner := common(every)):
+            alike[key] = inner
+    return alike
 
 
 def beyond(one: Mapping[str, Any], shared: Mapping[str, Any]) -> dict[str, Any]:
     """Return what one of nested blocks says beyond what all share."""
-    found = {}
+    more = {}
     for key, value in one.items():
         if key not in shared:
-            found[key] = value
+            more[key] = value
         elif value != shared[key]:
-            found[key] = beyond(value, shared[key])
-    return found
+            more[key] = beyond(value, shared[key])
+    return more
 
 
 def _as_yaml(block: Mapping[str, Any]) -> str:

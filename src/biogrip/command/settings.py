@@ -25,11 +25,12 @@ from biogrip.arrays import Array
 from biogrip.command.hold import remarks_on_hold
 from biogrip.command.options import Setting
 from biogrip.config.case import SampleCase
-from biogrip.config.experiment_blocks import LONGEST_S, SHORTEST_S
+from biogrip.config.experiment_blocks import LARGEST_PARAMETER, LONGEST_S, SHORTEST_S
 from biogrip.config.loading import load, read_config_of, read_configs, trace_defaults
 from biogrip.config.messages import checked, with_numbers
 from biogrip.config.source import (
     HOLD,
+    RAMP,
     KeyPath,
     Source,
     keys_in,
@@ -38,8 +39,18 @@ from biogrip.config.source import (
 )
 from biogrip.config.trace_blocks import TraceConfig
 from biogrip.errors import BiogripError
-from biogrip.physics.instruments import GRIPPER, INSTRUMENTS, Channel, Instrument
+from biogrip.physics.instruments import (
+    DISPLACEMENT,
+    FORCE,
+    GRIPPER,
+    INSTRUMENTS,
+    STRAIN,
+    STRESS,
+    Channel,
+    Instrument,
+)
 from biogrip.physics.models import ALIASES, CANDIDATES
+from biogrip.physics.shapes import KNOWN_SHAPES
 from biogrip.traces.columns import (
     held_unit,
     place,
@@ -60,9 +71,7 @@ LOAD = ("measurement", "load")
 _PROTOCOLS = (HOLD, LOAD, ("protocol",))
 # What stands in no name of a file everywhere, and what writes it.
 _UNSAFE = re.compile(r"[^\w .,=()+-]")
-_PRONY = re.compile(r"prony_?([1-8])")
-# What a sphere's force and indentation count as.
-_BY_SPHERE = {"force": "stress", "displacement": "strain"}
+_PRONY = re.compile(r"(?:prony|sls)_?([1-8])")
 # Of each group of keys of the measurement, the one that is set last replaces the others.
 _ONE_OF = {"start_s", "fit_start"}, {*READINGS}
 _MOST_SHOWN = 10
@@ -108,27 +117,35 @@ class Asked:
     def given(self) -> dict[str, Any]:
         """Blocks of the user's: those of the config, and over them the settings.
 
-        A sphere's force and indentation are what they count as.
+        The load and the depth of a shape are what they count as.
         """
         blocks, _ = read_config_of(TraceConfig, self.configs)
         for setting in self.settings:
             blocks = _laid_over(blocks, setting)
-        measured = measured_keys(blocks)
-        if measured.get("sphere") is None:
-            return blocks
-        for name in {*measured} & {*_BY_SPHERE.values()}:
+        counts_as = _by_shape(measured := measured_keys(blocks))
+        for name in {*measured} & ({*counts_as.values()} - {*counts_as}):
             raise BiogripError(
-                f"{self.place}: found a sphere and a reading of {name}; allowed are a force and an "
-                "indentation, as by --reading force=COLUMN."
+                f"{self.place}: found a shape and a reading of {name}; allowed are "
+                f"{' and '.join(counts_as)}, as by --reading {[*counts_as][name == STRAIN.name]}="
+                "COLUMN."
             )
-        renamed = {_BY_SPHERE.get(key, key): value for key, value in measured.items()}
-        return {**blocks, "measurement": renamed}
+        renamed = {counts_as.get(key, key): value for key, value in measured.items()}
+        return {**blocks, "measurement": renamed} if counts_as else blocks
 
     def read(self, columns: MeasurementBlock) -> Recording:
         """Read the trace; a `BiogripError` has file, line and column, or array and index."""
         if self.arrays:
             return recording_of_arrays(columns, *self.arrays)
         return read_recording(self.trace, columns)
+
+
+def _by_shape(measured: Mapping[str, Any]) -> dict[str, str]:
+    """Return as which stress and strain the load and the depth of a shape count; {} without one."""
+    if (text := measured.get("shape")) is None:
+        return {}
+    shape = KNOWN_SHAPES.get(str(text).strip().partition(" ")[0])
+    load = shape.load if shape else FORCE
+    return {load.name: STRESS.name, DISPLACEMENT.name: STRAIN.name}
 
 
 def measured_keys(blocks: Mapping[str, Any]) -> dict[str, Any]:
@@ -148,6 +165,9 @@ def _laid_over(blocks: dict[str, Any], setting: Setting) -> dict[str, Any]:
     if prony := _PRONY.fullmatch(name):
         name = f"generalized_maxwell_{prony[1]}".removesuffix("_1")
         blocks = overlaid(blocks, {"fixed": {"c_p": 0.0}})
+    if name == "jeffreys":
+        # A Burgers fluid whose spring is rigid.
+        name, blocks = "burgers", overlaid(blocks, {"fixed": {"k_s": LARGEST_PARAMETER}})
     if sample := CANDIDATES.get(ALIASES.get(name, name)):
         path, value = ("sample",), {"model": sample.name, "branches": sample.branches}
     for part in reversed(path):
@@ -197,10 +217,10 @@ def _refuse_two_protocols(asked: Asked, given: Mapping[str, Any]) -> None:
 def _source(setting: Setting, known: set[KeyPath], merged: Mapping[str, Any]) -> Source:
     """Return the keys that a setting is to be named for: its own, and blocks that it adds."""
     path: KeyPath = setting.path
-    if path[0] == "measurement" and "sphere" in merged["measurement"]:
-        path = (path[0], *(_BY_SPHERE.get(str(key), key) for key in path[1:]))
+    if path[0] == "measurement" and (counts_as := _by_shape(measured_keys(merged))):
+        path = (path[0], *(counts_as.get(str(key), key) for key in path[1:]))
     held = {"protocol": merged["protocol"]}
-    keys = keys_in(held) if path in (HOLD, LOAD) else keys_in(setting.value, path)
+    keys = keys_in(held) if path in (HOLD, RAMP, LOAD) else keys_in(setting.value, path)
     above = [path[:length] for length in range(1, len(path)) if path[:length] not in known]
     return setting.by, dict.fromkeys([*above, path, *keys])
 
@@ -215,12 +235,18 @@ def _with_instrument(
     is read is relative to it. Where it follows from the trace, this is returned, too, and what was
     controlled, if it was recorded, see `Experiment.record`.
     """
-    blocks = {name: block for name, block in merged.items() if name != HOLD[0]}
+    blocks = {name: block for name, block in merged.items() if name not in (*HOLD, *RAMP)}
     if not isinstance(merged["measurement"], dict):
         return blocks, None, None
-    held, by = merged.get(HOLD[0]), _place_of_hold(asked)
+    held, by, ramp_s = merged.get(HOLD[0]), _place_of(HOLD, asked), merged.get(RAMP[0], 0.0)
     instrument = _instrument(merged, given)
     measurement = _measurement_of(asked, merged["measurement"], instrument)
+    if ramp_s and (instrument.sweeps or measurement.get(LOAD[-1]) or "protocol" in given):
+        raise BiogripError(f"{_place_of(RAMP, asked)}: goes with --hold; leave it out.")
+    if ramp_s and instrument.relative:
+        # What a rising strain is divided by, that of its end or its own, nothing tells.
+        risen_s = (measurement.get("start_s") or 0.0) + ramp_s
+        measurement["from_s"] = max(measurement.get("from_s") or risen_s, risen_s)
     kind = given.get("instrument", instrument.kind)
     blocks |= {"instrument": kind, "measurement": measurement}
     block = checked(MeasurementBlock, measurement)[0]
@@ -250,22 +276,28 @@ def _with_instrument(
     start_s = measurement.get("start_s")
     if recording.load is None:
         lasts_s = _duration(recording, start_s)
-        return _with_hold(blocks, controlled, level, lasts_s), recording, None
+        if ramp_s >= lasts_s:
+            text = f"found {ramp_s:g} s, allowed is less than the trace's {lasts_s:g} s"
+            raise BiogripError(f"{_place_of(RAMP, asked)}: {text}.")
+        return _with_hold(blocks, controlled, level, lasts_s, ramp_s), recording, None
+    touching = recording.load
+    if block.tip_power is not None:
+        touching = np.maximum(touching, (-np.inf, 0.0))
     if start_s is None:
-        start_s = _start_of(recording.load)
+        start_s = _start_of(touching)
         blocks["measurement"] = measurement | {"start_s": start_s or None}
     record = _from(recording.load, start_s)
-    largest = float(max(record[:, 1], key=abs))
+    largest = float(max(touching[:, 1], key=abs))
     if instrument.relative and largest:
         record[:, 1] /= largest
     return _with_hold(blocks, controlled, largest, float(record[-1, 0])), recording, record
 
 
-def _place_of_hold(asked: Asked) -> str:
-    """Return the option, or the cell of a table, that says what was held."""
+def _place_of(path: KeyPath, asked: Asked) -> str:
+    """Return the option, or the cell of a table, that says what was held, or how it was reached."""
     row = "" if asked.place == TRACE else f"{asked.place}: "
-    said = (setting.by for setting in asked.settings[::-1] if setting.path == HOLD)
-    return next(said, f"{row}--hold")
+    said = (setting.by for setting in asked.settings[::-1] if setting.path == path)
+    return next(said, f"{row}{path[0]}")
 
 
 def _measurement_of(
@@ -283,11 +315,18 @@ def _measurement_of(
 
 
 def _with_hold(
-    blocks: Mapping[str, Any], controlled: Channel, level: float = 1.0, lasts_s: float = 1.0
+    blocks: Mapping[str, Any],
+    controlled: Channel,
+    level: float = 1.0,
+    lasts_s: float = 1.0,
+    ramp_s: float = 0.0,
 ) -> dict[str, Any]:
-    """Return the blocks with a protocol of one hold."""
-    phase = {"duration_s": lasts_s, controlled.column: level}
-    return {**blocks, "protocol": {"phases": [phase]}}
+    """Return the blocks with a protocol of one hold, that is reached at once or linearly."""
+    column = controlled.column
+    phases = [{"duration_s": lasts_s - ramp_s, column: level}]
+    if ramp_s:
+        phases.insert(0, {"duration_s": ramp_s, column: 0.0, f"to_{column}": level})
+    return {**blocks, "protocol": {"phases": phases}}
 
 
 def _duration(recording: Recording, start_s: float | None) -> float:

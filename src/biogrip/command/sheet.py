@@ -15,27 +15,24 @@ from io import StringIO
 from itertools import zip_longest
 from pathlib import Path
 
-from biogrip.command.options import OPTIONS, Setting
+from biogrip.command.options import OPTIONS, REPLACED, Setting
 from biogrip.command.outputs import COLUMNS
 from biogrip.command.settings import Asked, measured_keys, refuse_all
-from biogrip.config.loading import read_configs, trace_defaults
-from biogrip.config.source import dotted, keys_in, value_of
+from biogrip.config.source import value_of
 from biogrip.digits import counted
 from biogrip.errors import BiogripError, nearest
-from biogrip.physics.instruments import INSTRUMENTS
+from biogrip.physics.instruments import CONTROLLED
 from biogrip.physics.models import ALIASES, CANDIDATES
 from biogrip.terminal import visible
 from biogrip.traces.columns import listed, number_and_unit, place, trace_file_problem
 from biogrip.traces.measurement_block import READINGS
 
 _FILES = ("file", "filename", "filepath", "path", "trace", "tracefile")
-_OF_NUMBERS = ("hold", "noise", "noise_share", "start", "from", "until")
-_OF_WORDS = ("noise_model", "offset", "drift", "reading", "sphere")
+_OF_NUMBERS: tuple[str, ...] = ("hold", "ramp", "noise", "noise_share", "start", "from", "until")
+_OF_WORDS: tuple[str, ...] = ("noise_model", "offset", "drift", "reading", "shape")
 # Other names of what is held.
-_HELD = ("held", "load", "pressure_Pa", "indentation_m")
+_HELD = {"held", "load", "pressure", "indentation", *(channel.name for channel in CONTROLLED)}
 _SEPARATORS = ",;\t"
-# Blocks whose numbers are an instrument's.
-_INSTRUMENT = ("gripper", "actuator")
 _OF_RESULTS = re.compile(r".* (verdict|value|low|high)( \(.*\))?")
 _HEAD_BYTES = 100_000
 # Of a table of traces at most; rows are as wide as its header.
@@ -73,35 +70,18 @@ def _file_column(names: Sequence[str]) -> str | None:
 
 
 def _meant(name: str, cells: Sequence[str]) -> str | None:
-    """Return the option or key that a column is, but for its prefix, unit or spelling."""
+    """Return the option that a column is, but for its unit or spelling; None for others."""
     if all(cell.lower() in {*ALIASES, *CANDIDATES} for cell in cells):
         return "model"
-    plain = _plain(name)
+    bare, options = re.sub(r"_?[(\[].*$|_[^_]+$", "", _plain(name)), _OF_NUMBERS
     try:
         for cell in cells:
             number_and_unit(cell)
+        if {bare, _plain(name)} & _HELD:
+            return "hold"
     except ValueError:
-        return next((word for word in _OF_WORDS if _misspelt(plain, word)), None)
-    blocks = read_configs([trace_defaults()])
-    keys = [path for path in keys_in(blocks) if path[0] in _INSTRUMENT]
-    known = {str(path[-1]): dotted(path) for path in keys} | dict.fromkeys(_HELD, "hold")
-    known |= {each.controlled.column: "hold" for each in INSTRUMENTS.values()}
-    known |= {dotted(path).replace(".", "_"): dotted(path) for path in keys}
-    known |= {name: name for name in _OF_NUMBERS}
-    by_plain = {re.sub("_[^_]+$", "", key).lower(): meant for key, meant in known.items()}
-    by_plain |= {key.lower(): meant for key, meant in known.items()}
-    bare = re.sub(r"_?[(\[].*$|_[^_]+$", "", plain)
-    if plain in by_plain or by_plain.get(bare) in _OF_NUMBERS:
-        return by_plain.get(plain, by_plain.get(bare))
-    near = get_close_matches(plain, [key for key in by_plain if "_" in key], n=1, cutoff=0.9)
-    near += [key for key in _OF_NUMBERS if _misspelt(plain, key)]
-    return by_plain[near[0]] if near else None
-
-
-def _misspelt(name: str, option: str) -> bool:
-    """Return True if a name has an option's letters in another order, or nearly in theirs."""
-    close = len(name) > 3 and get_close_matches(name, [option], cutoff=0.8)
-    return bool(close) or sorted(name) == sorted(option)
+        bare, options = _plain(name), _OF_WORDS
+    return next(iter(get_close_matches(bare, options, n=1, cutoff=0.75)), None)
 
 
 def read_table(
@@ -214,6 +194,8 @@ def _column_problems(
         where = place(path, 1, name)
         if name and name in header[:number]:
             yield f"{where}: stands twice; allowed is each name once."
+        elif new := REPLACED.get(_plain(name)):
+            yield f"{where}: is now the column '{new}', with cells as in 'sphere 2.5 um'."
         elif name not in used and (name in COLUMNS or _OF_RESULTS.fullmatch(name)):
             yield f"{where}: is a column of the results; allowed is another name."
         elif name and cells and "." not in name and name not in used:

@@ -14,6 +14,7 @@ from biogrip.judging.without_model import BEYOND, EXPONENT, FLOW, LEVEL, LOSS
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.models import CANDIDATES
 from biogrip.terminal import aligned, visible, visible_lines
+from biogrip.traces.columns import shape_and_sizes
 from biogrip.traces.measurement_block import KNOWN_NOISE
 
 # Instrument whose readings span decades: their misfit is told over their noise.
@@ -22,6 +23,8 @@ _SWEEPS = "oscillation"
 _LINES = 5
 # Most names of traces that are refused for what another one is.
 _MOST_NAMED = 5
+# Share of a quantity below which no error of the instrument is worth a line.
+_LEAST_MOVE = 1e-4
 _NUMBER = re.compile(r"\d[\d.e+-]*")
 # What the notes of a weight do to the fit.
 _MEANS = {
@@ -47,7 +50,7 @@ def in_words(found: Mapping[str, Any]) -> str:
     lines += [] if rejected else without_model_in_words(found)
     lines += one_sided_in_words([found], foremost(found))
     lines += [found["limits"]] if not rejected else []
-    lines += [each["words"] for each in found["hidden"][:1]]
+    lines += moves_in_words(found)
     lines += [trade["words"] for trade in found["trades"]]
     lines += fitted_in_words(found)
     lines += [f"Note: {visible(text)}" for text in further_notes(found)]
@@ -67,6 +70,31 @@ def without_model_in_words(found: Mapping[str, Any]) -> list[str]:
     width = max(len(each["quantity"]) for each in told)
     lines = (f"  {each['quantity']:<{width}}  {each['in_words']}" for each in told)
     return [f"Any linear sample that fits, whatever its model (least misfit {left}), has:", *lines]
+
+
+def rows_of_moves(found: Mapping[str, Any]) -> list[tuple[str, dict[str, float]]]:
+    """Return clauses on errors of the instrument, and by which share each moves what is shown."""
+    shown, of_any = {each["quantity"] for each in foremost(found)}, found["without_model"]["moves"]
+    rows: dict[str, dict[str, float]] = {}
+    for move in [*found["moves"], *of_any]:
+        kept = move in found["moves"]
+        changes = {name: by for name, by in move["changes"].items() if kept or name in shown}
+        rows.setdefault(move["words"], {}).update(changes)
+    return [*rows.items()]
+
+
+def moves_in_words(found: Mapping[str, Any]) -> list[str]:
+    """Return a line on what a zero moves most, and what is moved most, by the model and by any."""
+    rows, of_model = rows_of_moves(found), {each["quantity"] for each in found["quantities"]}
+    said: dict[str, None] = {}
+    for some, by_model in ((rows[:1], True), (rows, True), (rows, False)):
+        every = [(by, name, words) for words, row in some for name, by in row.items()]
+        chosen = [each for each in every if (each[1] in of_model) == by_model]
+        by, name, words = max(chosen, key=lambda it: abs(it[0]), default=(0.0, "", ""))
+        if abs(by) > _LEAST_MOVE:
+            way = f"{'falls' if by < 0 else 'rises'} by {plain(100 * abs(by), 2)} %"
+            said[f"{name} {way} if {words}"] = None
+    return [f"{'; '.join(said)}."] if said else []
 
 
 def foremost(found: Mapping[str, Any]) -> list[Mapping[str, Any]]:
@@ -122,6 +150,11 @@ def fitted_in_words(found: Mapping[str, Any]) -> list[str]:
     if "onset_s" in found:
         when = instant(found["onset_s"], *found["onset_limits_s"])
         lines.append(f"The protocol starts at {when} of the clock, as fitted.")
+    if "contact_m" in found:
+        depths = (1e9 * it for it in (found["contact_m"], *found["contact_limits_m"]))
+        value, low, high = (f"{depth:.3g}" for depth in depths)
+        text = f"The tip is deeper than recorded by {value} nm ({low} to {high}), as fitted."
+        lines.append(text)
     if "offset_rad" in found:
         lines.append(f"Offset of the instrument: {in_unit(found['offset_rad'], found)}")
     if "drift_rad_per_s" in found:
@@ -155,14 +188,14 @@ def one_sided_in_words(
     return [f"One-sided limits hold with {50 * (1 + found[0]['confidence']):g} % confidence."]
 
 
-def for_a_paper(found: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Return sentences for a paper, as text and as LaTeX: one per quantity with a limit.
+def for_a_paper(found: Mapping[str, Any]) -> list[str]:
+    """Return sentences for a paper: one per quantity with a limit.
 
     Each has its condition, if any. Nothing if the fit is doubtful or rejected.
     """
     if found["fit"] != OK:
         return []
-    pairs = []
+    sentences = []
     for each in found["quantities"]:
         low, high, confidence = each["low"], each["high"], 100 * found["confidence"]
         if low is None and high is None:
@@ -175,16 +208,9 @@ def for_a_paper(found: Mapping[str, Any]) -> list[tuple[str, str]]:
             numbers = within_limits(each["value"], low, high)
         provided = f", provided {each['provided']}" if each["provided"] else ""
         value, reach = f"{numbers[0]} {each['unit']}".rstrip(), " to ".join(numbers[1:])
-        told = f" {sign} {value} ({confidence:g} % {f'{kind} {reach}'.rstrip()}, n = 1 trace"
-        told += f"{provided})"
-        pairs.append((f"{each['quantity']}{told}", f"{each['symbol']}{_in_latex(told)}"))
-    return pairs
-
-
-def _in_latex(text: str) -> str:
-    """Return text as LaTeX, with powers of ten as mathematics."""
-    latex = text.translate(_LATEX_OF)
-    return _POWER.sub(lambda it: rf"${it[1]} \times 10^{{{int(it[2])}}}$", latex)
+        within = f"{confidence:g} % {f'{kind} {reach}'.rstrip()}, n = 1 trace{provided}"
+        sentences.append(f"{each['quantity']} {sign} {value} ({within})")
+    return sentences
 
 
 def further_notes(found: Mapping[str, Any]) -> list[str]:
@@ -300,33 +326,20 @@ REFERENCE = (
 )
 """How biogrip is cited, as in CITATION.cff."""
 
-_INSTRUMENTS = {
-    "gripper": "The {} of an arm of a microgripper was recorded",
-    "creep": "In creep the {} was recorded",
-    "relaxation": "In relaxation the {} was recorded",
-    "oscillation": "In oscillation storage and loss moduli were recorded over frequency",
-}
 _MOST_PHASES, _MOST_REFUSED = 4, 3
-_LATEX_OF = str.maketrans(
-    {
-        **{sign: rf"\{sign}" for sign in "%_&#${}"},
-        **{"\\": r"\textbackslash{}", "^": r"\^{}", "~": r"\~{}", "<": "$<$", ">": "$>$"},
-        **{"²": "$^2$", "χ": r"$\chi$", "τ": r"$\tau$", "Δ": r"$\Delta$", "→": r"$\to$"},
-    }
-)
-_POWER = re.compile(r"(\d[\d.]*)e([+-]\d+)\b")
 
 
 def set_up_in_words(found: Mapping[str, Any]) -> list[str]:
     """Return sentences on instrument, protocol, model, noise, limits and conditions of a trace."""
-    reads, assumed = found["reads"]["quantity"], found["assumed"]
-    under = "" if INSTRUMENTS[reads].sweeps else f" under {_protocol(found)}"
-    what = _INSTRUMENTS[found["instrument"]].format(reads.replace("_", " "))
-    said = [f"{what}{under}."]
-    if sphere := assumed["measurement"].get("sphere"):
+    instrument, assumed = INSTRUMENTS[found["reads"]["quantity"]], found["assumed"]
+    under = "" if instrument.sweeps else f" under {_protocol(found)}"
+    said = [f"{instrument.in_words}{under}."]
+    if text := assumed["measurement"].get("shape"):
+        shape, poisson = shape_and_sizes(text)[0], assumed["measurement"].get("poisson", 0.5)
+        of_tip = f", with Poisson's ratio {poisson:g}" * shape.is_tip
         said.append(
-            f"By Hertz's contact with a sphere of radius R = {sphere}, a force F is the stress "
-            "9F/(16R²) and an indentation d the strain (d/R)^1.5; moduli are Young's."
+            f"Moduli are Young's by the shape, {text}: {shape.law} ({shape.source}), where "
+            f"{shape.condition}{of_tip}."
         )
     if "gripper" in assumed:
         own = assumed["gripper"]
@@ -429,8 +442,8 @@ def in_sentences(text: str) -> list[str]:
     return re.split(r"(?<=\.) (?=[A-Z])", text)
 
 
-def paragraph(sentences: Iterable[str], version: str = __version__) -> tuple[str, str]:
-    """Return a paragraph as text and as LaTeX; at its end the software."""
+def paragraph(sentences: Iterable[str], version: str = __version__) -> str:
+    """Return a paragraph; at its end the software."""
     reference = REFERENCE.replace(__version__, version)
     text = " ".join([*sentences, f"Computed with biogrip {version} ({reference})."])
-    return legible(text), _in_latex(text)
+    return legible(text)

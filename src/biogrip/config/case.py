@@ -3,35 +3,19 @@
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 from biogrip.arrays import Array
 from biogrip.config.loading import default_ranges, read_configs, trace_defaults
-from biogrip.config.trace_blocks import ModelSelection, SampleBlocks
+from biogrip.config.trace_blocks import CommonBlocks, SampleBlocks
 from biogrip.fit.experiment import Experiment
 from biogrip.keys import plain
-from biogrip.physics.gripper import NO_ARMS, CombDrive, Contact, Gripper
+from biogrip.physics.gripper import NO_ARMS, Contact, Gripper
 from biogrip.physics.instruments import Instrument
 from biogrip.physics.models import CANDIDATES, Sample
 from biogrip.physics.noise import Noise
 from biogrip.physics.protocol import Course, Phase, join_phases, sample_times
 from biogrip.physics.sample_model import Network, with_fixed
-
-
-class CommonKeys(Protocol):
-    """Keys of a config that are the same for all of its cases."""
-
-    @property
-    def actuator(self) -> CombDrive:
-        """The rotary comb drive."""
-
-    @property
-    def model_selection(self) -> ModelSelection:
-        """Sample models to compare."""
-
-    @property
-    def study_seed(self) -> int:
-        """Seed of all random numbers."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +26,7 @@ class SampleCase:
     """Name used in files."""
     block: SampleBlocks
     """Config block, with the blocks that cases share merged in."""
-    common: CommonKeys
+    common: CommonBlocks
     """What all cases share."""
     record: Array | None = None
     """What was controlled in a recorded trace, if it was recorded; see `Experiment.record`."""
@@ -151,6 +135,8 @@ class SampleCase:
             uncertainty=uncertainty.by_part if uncertainty else {},
             fit_start=measurement.fit_start,
             record=self.record,
+            tip_power=measurement.tip_power,
+            fit_contact=measurement.fit_contact,
             undeclared=frozenset(
                 name for name in measurement.along if getattr(measurement, name) is None
             ),
@@ -172,11 +158,12 @@ class SampleCase:
             return judged
         measured, models = self.block.measurement, self.common.model_selection.models
         # A recorded load that is there in its first row came before that.
-        known = measured.fit_start or (self.record is not None and not self.record[0, 1])
+        first = None if self.record is None else self.record[0, 1]
+        known = measured.fit_start or first == 0 or (measured.tip_power and (first or 0.0) < 0)
         usual = read_configs([trace_defaults()])["model_selection"]["models"]
         return replace(
             judged,
-            start_given=known or measured.start_s is not None,
+            start_given=bool(known) or measured.start_s is not None,
             models=models,
             usual_models=[*models] == usual,
         )

@@ -6,10 +6,8 @@ from typing import Annotated
 
 from pydantic import Field
 
-from biogrip.config.trace_blocks import CaseName, ExperimentBlocks, ModelSelection, SampleBlocks
-from biogrip.errors import nearest
-from biogrip.keys import Block, Complaint, Distinct, below
-from biogrip.physics.gripper import CombDrive
+from biogrip.config.trace_blocks import CaseName, CommonBlocks, ExperimentBlocks, SampleBlocks
+from biogrip.keys import Block, Complaint, Distinct, below, unknown_names
 
 SHARED = tuple(block.name for block in fields(ExperimentBlocks))
 """Blocks that may be given for all samples, and in a case for it alone."""
@@ -32,13 +30,9 @@ class DesignBlock(Block):
 
 
 @dataclass(frozen=True, kw_only=True)
-class DesignConfig(ExperimentBlocks):
+class DesignConfig(CommonBlocks, ExperimentBlocks):
     """Samples, what is known of their experiment, and the limits of the design."""
 
-    actuator: CombDrive
-    """The rotary comb drive (Table 2)."""
-    model_selection: ModelSelection
-    study_seed: int = 1
     cases: Annotated[Mapping[CaseName, SampleBlocks], Field(min_length=1, max_length=100)]
     """Samples by name."""
     only: Distinct[Annotated[tuple[str, ...], Field(max_length=100)]] = ()
@@ -50,12 +44,6 @@ class DesignConfig(ExperimentBlocks):
         for name, case in self.cases.items():
             yield from below(("cases", name), case.comb_complaints(self.actuator))
         searched = [p.name for case in self.cases.values() for p in case.searched]
-        lists = {
-            ("only",): (self.only, self.cases),
-            ("design", "parameters"): (self.design.parameters, dict.fromkeys(searched)),
-        }
-        for path, (names, allowed) in lists.items():
-            for index, name in enumerate(names):
-                if name not in allowed:
-                    text = f"found '{name}', allowed are {', '.join(allowed)}."
-                    yield (*path, index), text + nearest(name, allowed)
+        yield from unknown_names(("only",), self.only, self.cases)
+        asked = self.design.parameters
+        yield from unknown_names(("design", "parameters"), asked, dict.fromkeys(searched))

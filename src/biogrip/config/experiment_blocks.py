@@ -236,7 +236,10 @@ class SampleBlock(Checked, BaseModel):
         str,
         OneOf(MODELS),
         USUAL_NAMES,
-        Field(description='Constitutive model, see "Sample models" for its parameters.'),
+        Field(
+            description='Constitutive model, see "Sample models" for its parameters.',
+            json_schema_extra={"usual": [*ALIASES, "jeffreys"]},
+        ),
     ]
     branches: Annotated[
         int,

@@ -15,7 +15,7 @@ from pydantic_core import ErrorDetails
 
 from biogrip.config.source import values_in
 from biogrip.digits import counted
-from biogrip.errors import nearest
+from biogrip.errors import nearest, nearest_three
 from biogrip.keys import CONFLICT, TWICE, Complaint, adapter, built, kind_of
 from biogrip.physics.instruments import ROTATION
 from biogrip.traces.columns import TIME_UNITS
@@ -96,6 +96,9 @@ def _text(
             return MISSING
         case "literal_error":
             choices = leaf.get("enum")
+            if usual := leaf.get("usual"):
+                near = nearest_three(found, [*choices, *usual])
+                return f"found {_shown(found)}. Did you mean {near}? All: biogrip identify -h."
             hint = "" if choices in _UNITS_OF_FILES else nearest(found, choices)
             return f"found {_shown(found)}.{hint} Allowed: {', '.join(choices)}."
         case "string_pattern_mismatch" if of_name:

@@ -21,8 +21,9 @@ Lines = Mapping[KeyPath, int | None]
 Source = tuple[str, Lines]
 """Name of a file or of another source of keys, and the line (from 1) of each that it has."""
 
-HOLD = ("--hold",)
-"""Path of the only setting that is no key: what is controlled from 0 to the end of the trace."""
+HOLD, RAMP = ("--hold",), ("--ramp",)
+"""Paths of the settings that are no keys: what is controlled from 0 to the end of the trace, and in
+how many s that is reached."""
 
 LARGEST_BYTES = 1_000_000
 """Bytes of a config file at most."""

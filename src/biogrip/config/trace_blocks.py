@@ -152,14 +152,25 @@ class SampleBlocks(ExperimentBlocks):
 
 
 @dataclass(frozen=True, kw_only=True)
-class TraceConfig(SampleBlocks):
-    """All keys of what a trace is asked."""
+class CommonBlocks(Block):
+    """Keys of a config that are the same for all of its samples."""
 
-    actuator: CombDrive
-    """The rotary comb drive (Table 2)."""
+    actuator: Annotated[CombDrive, Field(description="The rotary comb drive (Table 2).")]
     model_selection: ModelSelection
-    study_seed: Annotated[int, Field(ge=0, le=2**64 - 1)] = 1
-    """Seed of all random numbers."""
+    study_seed: Annotated[
+        int,
+        Field(
+            ge=0,
+            le=2**64 - 1,
+            description="The one seed. Noise and methods draw from streams derived from it, the "
+            "case's name and the number of the trace.",
+        ),
+    ] = 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class TraceConfig(CommonBlocks, SampleBlocks):
+    """All keys of what a trace is asked."""
 
     def complaints(self) -> Iterator[Complaint]:
         """Find blocks that are in conflict, and a sample that does not fit between the jaws."""

@@ -19,7 +19,7 @@ from biogrip.physics.simulation import simulated_response
 
 
 @dataclass(frozen=True)
-class Fit:
+class FittedTrace:
     """A trace and the response that was fitted to it."""
 
     time_s: Array
@@ -43,7 +43,7 @@ def fit_of(
     measured: Array,
     sd: Array | None = None,
     target: Array | None = None,
-) -> Fit:
+) -> FittedTrace:
     """Return a trace, and the response of parameters with nuisance terms fitted.
 
     Fixed parameters need not be given.
@@ -52,7 +52,7 @@ def fit_of(
     device = problem.gripper, network, problem.torque
     simulated = simulated_response(*device, time_s)[0]
     fitted = simulated + within(problem.nuisance(time_s), measured - simulated, sd)
-    return Fit(time_s, target, measured, fitted, sd, problem.instrument.read)
+    return FittedTrace(time_s, target, measured, fitted, sd, problem.instrument.read)
 
 
 def scale_of(values: Array, unit: str) -> tuple[float, str]:
@@ -71,10 +71,10 @@ def scale_of(values: Array, unit: str) -> tuple[float, str]:
 
 _READINGS: dict[str, Any] = {"linestyle": "", "marker": ".", "markersize": 1.2, "rasterized": True}
 # Readings that are drawn in full colour; of more, residuals have means of so many parts.
-_FEW, _PALEST, _PARTS = 300, 0.25, 40
+_FEW_READINGS, _PALEST, _PARTS = 300, 0.25, 40
 
 
-def draw_traces(axes: Axes, fits: Mapping[str, Fit]) -> tuple[float, str]:
+def draw_traces(axes: Axes, fits: Mapping[str, FittedTrace]) -> tuple[float, str]:
     """Draw a trace, its target, its fit and others, by label; return factor and unit."""
     fit = next(iter(fits.values()))
     factor, unit = scale_of(fit.fitted, fit.read.unit)
@@ -85,19 +85,19 @@ def draw_traces(axes: Axes, fits: Mapping[str, Fit]) -> tuple[float, str]:
         axes.plot(
             fit.time_s, factor * fit.target, color=style.TARGET, linewidth=2.4, label="target"
         )
-    for (label, each), color in zip(fits.items(), style.RUNS, strict=False):
-        axes.plot(each.time_s, factor * each.fitted, color=color, label=label)
+    for (label, fitted), color in zip(fits.items(), style.RUNS, strict=False):
+        axes.plot(fitted.time_s, factor * fitted.fitted, color=color, label=label)
     axes.set_ylabel(with_unit(fit.read.title, unit))
     return factor, unit
 
 
 def _readings(count: int) -> dict[str, Any]:
     """Style of readings, the paler the more there are, for curves to be seen."""
-    return _READINGS | {"alpha": max(min(1.0, _FEW / count), _PALEST)}
+    return _READINGS | {"alpha": max(min(1.0, _FEW_READINGS / count), _PALEST)}
 
 
 def _means(axes: Axes, time_s: Array, residual: Array) -> None:
-    if len(residual) <= _FEW:
+    if len(residual) <= _FEW_READINGS:
         return
     times, parts = np.array_split(time_s, _PARTS), np.array_split(residual, _PARTS)
     error = [part.std(ddof=1) / np.sqrt(len(part)) for part in parts]
@@ -105,7 +105,9 @@ def _means(axes: Axes, time_s: Array, residual: Array) -> None:
     axes.errorbar(at, mean, error, fmt="o", color=style.BLUE, markersize=2, linewidth=0.8, zorder=3)
 
 
-def draw_fit(fits: Mapping[str, Fit], title: str, axis_rad: tuple[float, ...] = ()) -> Figure:
+def draw_fit(
+    fits: Mapping[str, FittedTrace], title: str, axis_rad: tuple[float, ...] = ()
+) -> Figure:
     """Draw a trace, its fit and the residuals, on an axis that includes the paper's limits.
 
     Of further fits, which are to other traces of the same target, the target's residuals are drawn.
@@ -144,7 +146,7 @@ def draw_fit(fits: Mapping[str, Fit], title: str, axis_rad: tuple[float, ...] = 
     return drawn
 
 
-def draw_sweep(fit: Fit, title: str) -> Figure:
+def draw_sweep(fit: FittedTrace, title: str) -> Figure:
     """Draw both moduli of a sweep, their fit, and the residuals in percent of it."""
     drawn = style.figure(style.COLUMN_IN, 3.6)
     moduli, residuals = drawn.subplots(2, 1, sharex=True, height_ratios=[2.4, 1])

@@ -19,18 +19,18 @@ from biogrip.judging.quantities import quantity_value
 from biogrip.levels import CERTAIN
 
 # End of the axis of profiles, and ratio of the ends above which that of values is logarithmic.
-_HIGHEST_INCREASE, _WIDE = 12.0, 5.0
+_HIGHEST_INCREASE, _LOGARITHMIC_FROM = 12.0, 5.0
 
 
 def draw_profiles_of(
-    found: Mapping[str, Any],
+    judged: Mapping[str, Any],
     others: Sequence[Mapping[str, Any]] = (),
     title: str = "",
     truth_of: Mapping[str, float] | None = None,
 ) -> Figure:
     """Draw profiles of verdicts, beside others that are expected and true parameters."""
     foreseen = {item["quantity"]: item for item in others[0]["quantities"]} if others else {}
-    quantities = found["quantities"]
+    quantities = judged["quantities"]
     drawn, grid = style.row_of_panels(len(quantities), 2.5, sharey=True)
     for index, (axes, item) in enumerate(zip(grid, quantities, strict=True)):
         if item["quantity"] in foreseen:
@@ -38,8 +38,8 @@ def draw_profiles_of(
             axes.plot(*curve, color=style.GREY, label="expected without noise")
         draw_profile(axes, item)
         for increase, look, label in (
-            (found["threshold"], "--", f"{100 * found['confidence']:g} %"),
-            (found["certainty"], ":", f"{100 * CERTAIN:g} %, to close a side"),
+            (judged["threshold"], "--", f"{100 * judged['confidence']:g} %"),
+            (judged["certainty"], ":", f"{100 * CERTAIN:g} %, to close a side"),
         ):
             axes.axhline(increase, color=style.TARGET, linestyle=look, linewidth=0.7, label=label)
         truth = quantity_value(item["quantity"], truth_of or {})
@@ -55,9 +55,9 @@ def draw_profiles_of(
 def draw_profile(axes: Axes, item: Mapping[str, Any]) -> None:
     """Draw the profile of a quantity's verdict, with its limits."""
     axes.plot(*_curve(item["profile"]), color=style.FITTED, label="this trace")
-    _limits(axes, item)
+    _shade_within_limits(axes, item)
     low, high = _profile_limits(item)
-    if high / low > _WIDE:
+    if high / low > _LOGARITHMIC_FROM:
         axes.set_xscale("log")
         axes.set_xticks(*_decade_ticks(low, high))
         axes.minorticks_off()
@@ -98,13 +98,13 @@ def _decade_ticks(low: float, high: float) -> tuple[list[float], list[str]]:
         chosen = decades[::step]
         return [10.0**d for d in chosen], [f"10{str(d).translate(SUPERSCRIPTS)}" for d in chosen]
     steps = [m * 10.0**d for d in range(first - 1, last + 2) for m in (1, 2, 5)]
-    found = [value for value in steps if low <= value <= high]
+    ticks = [value for value in steps if low <= value <= high]
     # Labels of these values are wide, so keep two.
-    inside = [found[0], found[-1]] if len(found) > 2 else found
+    inside = [ticks[0], ticks[-1]] if len(ticks) > 2 else ticks
     return inside, [f"{value:g}" for value in inside]
 
 
-def _limits(axes: Axes, item: Mapping[str, Any]) -> None:
+def _shade_within_limits(axes: Axes, item: Mapping[str, Any]) -> None:
     low, high = item["low"], item["high"]
     values = item["profile"]["values"]
     if low is not None or high is not None:

@@ -35,7 +35,7 @@ TARGET, MEASURED, FITTED, PAPER, ALL_SEEDS = BLACK, SKY, ORANGE, GREEN, GREY
 RUNS = (FITTED, BLUE)
 
 COLORS = {"grey": GREY, "blue": BLUE, "vermilion": ORANGE, "green": GREEN, "purple": PURPLE}
-"""By the names that methods say them by (`biogrip.fit.problem`)."""
+"""Of methods, by name."""
 
 # Most panels that are legible in one row.
 _MOST_SIDE_BY_SIDE, _LEGEND_IN = 5, 0.4

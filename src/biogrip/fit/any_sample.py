@@ -23,7 +23,7 @@ from biogrip.arrays import Array, BoolArray
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.noise_model_fit import absorbed
 from biogrip.physics.modes import Modes, lag_course, mode_responses
-from biogrip.physics.protocol import SWEEP, Course, is_storage
+from biogrip.physics.protocol import SWEEP, Course
 from biogrip.physics.residuals import Residuals
 
 # Lags: shortest over the time between the closest readings, longest over the protocol; how many a
@@ -35,8 +35,6 @@ _WIDER = 100.0
 _OUTLYING = 36.0
 # The smooth rotation and the weights are found in turn.
 _ROUNDS = 4
-# Fewest degrees of freedom with which each modulus of a sweep has its own scatter.
-_FREE = 12
 # Share of the readings whose scatter bounds the noise from below, and fewest of them.
 _SMALL, _FEWEST = 0.1, 5
 # Their scatter over that of the share, beyond which there is other noise: chi-squared with five
@@ -157,13 +155,20 @@ class AnySampleFit:
 
     def left_of_readings(self) -> tuple[Array, Array]:
         """Return what it leaves of the readings, (n_samples,), and a basis of what it absorbs."""
-        own, lags, residuals = self.amplitudes > 0, self.lags, self.lags.residuals
-        trace, course = residuals.trace, residuals.course
-        shown = mode_responses(-lags.rates[own][None], course, trace.time_s)[0]
-        shown *= (1.0 if course.deforms else -1.0) / lags.sizes[own, None]
-        shown = trace.condensed.cleared(shown)
+        trace, own = self.lags.residuals.trace, self.amplitudes > 0
+        shown = trace.condensed.cleared(self._shown(self.lags.residuals))
         residual: Array = trace.cleared - self.amplitudes[own] @ shown
-        return residual, absorbed(np.vstack((shown, trace.condensed.nuisance)))
+        return residual, absorbed(np.vstack((shown, trace.condensed.taken)))
+
+    def response(self, residuals: Residuals) -> Array:
+        """Return what it shows, (n_samples,), under the protocol and at the times of residuals."""
+        return self.amplitudes[self.amplitudes > 0] @ self._shown(residuals)
+
+    def _shown(self, residuals: Residuals) -> Array:
+        """Return the same of unit amplitudes of the lags that it has, (n, n_samples)."""
+        course, own = residuals.course, self.amplitudes > 0
+        shown = mode_responses(-self.lags.rates[own][None], course, residuals.trace.time_s)[0]
+        return shown * ((1.0 if course.deforms else -1.0) / self.lags.sizes[own, None])
 
 
 def count_lags(chosen: BoolArray) -> int:
@@ -247,47 +252,15 @@ def proportional_deviations(problem: Experiment, time_s: Array, readings: Array)
     return np.maximum(deviations, _ROUNDING * float(np.max(np.abs(readings))))
 
 
-def swept_deviations(
-    places: Array, readings: Array, share: float | None, more: float
-) -> tuple[Array, dict[str, float]]:
-    """Compute standard deviations of a sweep's readings, (n_samples,), and the shares of moduli.
-
-    They are in proportion to the moduli of the linear sample that is nearest, and `more` is added,
-    squared. Without a share, each modulus has that by which its readings over these scatter from
-    one frequency to the next; or both have one, if that sample takes most of few readings.
-    """
-    storage, (shortest_s, longest_s) = is_storage(places), SWEEP.spread_s(places)
+def spread_swept_lags(places: Array) -> list[float]:
+    """Return lags in s that span any linear sample at places of a sweep, see `Sweep`."""
+    shortest_s, longest_s = SWEEP.spread_s(places)
     count = int(_RATES_A_DECADE * np.log10(_WIDER**2 * longest_s / shortest_s))
-    lags_s = [*np.geomspace(shortest_s / _WIDER, longest_s * _WIDER, count), _LASTING * longest_s]
-    family = lag_course(SWEEP, lags_s, places)
-    smooth, shares = readings, [share or 1.0] * 2
-    for _ in range(_ROUNDS):
-        amplitudes, _ = fit_responses(readings / smooth, family / smooth)
-        smooth = np.clip(amplitudes @ family, 0.5 * readings, 2.0 * readings)
-    if share is None:
-        shares = _swept_shares(readings, smooth, storage, 2 * count_lags(amplitudes > 0))
-    sd = np.hypot(np.where(storage, *shares) * smooth, more)
-    return sd, dict(zip(("storage", "loss"), shares, strict=True))
+    lags_s = np.geomspace(shortest_s / _WIDER, longest_s * _WIDER, count).tolist()
+    return [*lags_s, _LASTING * longest_s]
 
 
-def _swept_shares(readings: Array, smooth: Array, storage: BoolArray, taken: int) -> list[float]:
-    """Return the shares of storage and loss modulus by which they scatter about smooth ones.
-
-    These have taken some degrees of freedom from the readings, (n_samples,).
-    """
-    free, apart = len(readings) - taken, readings / smooth - 1
-    if free >= max(_FREE, len(readings) / 2):
-        return [_scatter(apart[of]) for of in (storage, ~storage)]
-    if free > 0:
-        square = float(np.sum(apart**2)) / free
-    else:
-        # Smooth ones take all of a few, which scatter about lines on logarithmic axes.
-        logs = np.log(readings)
-        square = float(np.mean([_scatter(logs[of]) ** 2 for of in (storage, ~storage)]))
-    return [max(float(np.sqrt(square)), _ROUNDING)] * 2
-
-
-def _scatter(values: Array) -> float:
+def scatter_of(values: Array) -> float:
     """Return the standard deviation of values by differences of neighbours, without outliers."""
     squares = np.diff(values, min(len(values) - 1, 2)) ** 2
     usual = squares[squares <= _OUTLYING * np.median(squares)]

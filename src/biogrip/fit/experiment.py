@@ -13,11 +13,12 @@ from biogrip.fit.search_range import GeneRange
 from biogrip.physics.condensed import Condensed, SweptRows
 from biogrip.physics.fractional import LONGEST_S, on_clock
 from biogrip.physics.gripper import Gripper
-from biogrip.physics.instruments import Instrument
+from biogrip.physics.instruments import Instrument, in_contact
 from biogrip.physics.models import Sample
 from biogrip.physics.noise import (
     WEIGHTED,
     NoiseModel,
+    PairWhitening,
     Whitening,
     nuisance_basis,
     stream,
@@ -61,6 +62,8 @@ class Experiment:
     """Standard deviation of the noise as a share of the readings, see `proportional_deviations`."""
     sd: Array | None = field(default=None, compare=False)
     """Standard deviations of the readings of a trace, see `weighted`, (n_samples,)."""
+    correlation: Array | None = field(default=None, compare=False)
+    """Correlation of the noise of both moduli of a sweep, see `PairWhitening`, (n_frequencies,)."""
     coloured: bool = False
     """True if the noise of a trace may be autocorrelated, see `fit_least_squares`."""
     uncertainty: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
@@ -72,6 +75,15 @@ class Experiment:
     record: Array | None = field(default=None, compare=False)
     """Times from the start and what was controlled at them, (n, 2), where that was recorded, see
     `biogrip.physics.protocol`; the phases are then a hold as long and as high."""
+    tip_power: float | None = None
+    """Exponent of the depth of which the record has powers, with their sign before the contact."""
+    deeper: float = 0.0
+    """By how much a tip is deeper than recorded, in the depth's unit (`in_contact`)."""
+    fit_contact: bool = False
+    """True if that is fitted along (`biogrip.identify.contact`)."""
+    load_errors: Array | None = field(default=None, compare=False)
+    """Directions in which a record that was smoothed may be off, (n_directions, n), each as long as
+    its standard deviation."""
     undeclared: frozenset[str] = frozenset()
     """Which of ``offset`` and ``drift`` nothing is said of: a noise model brings them along."""
     given_ranges: frozenset[str] = frozenset()
@@ -101,7 +113,11 @@ class Experiment:
         if self.instrument.sweeps:
             return SWEEP
         if self.record is not None:
-            return follow_rows(*self.record.T, deforms=self.instrument.deforms)
+            time_s, loads = self.record.T
+            if self.tip_power is not None:
+                loads = in_contact(loads, self.tip_power, self.deeper)
+            course = follow_rows(time_s, loads, deforms=self.instrument.deforms)
+            return replace(course, smoothed=self.load_errors is not None)
         return join_phases(self.phases, deforms=self.instrument.deforms)
 
     @cached_property
@@ -124,9 +140,12 @@ class Experiment:
         """Leave out noise model, gripper uncertainty, and ranges neither it nor `others` use."""
         chosen = {p.range_name for model in (self.model, *others) for p in model.parameters}
         ranges = {name: genes for name, genes in self.ranges.items() if name in chosen}
-        return replace(self, ranges=ranges, coloured=False, uncertainty={})
+        exact = replace(self, uncertainty={}, load_errors=None, fit_contact=False)
+        return replace(exact, ranges=ranges, coloured=False)
 
-    def weighted(self, sd: Array | None, *, known: bool = True) -> "Experiment":
+    def weighted(
+        self, sd: Array | None, *, known: bool = True, correlation: Array | None = None
+    ) -> "Experiment":
         """Divide the readings of a trace by their standard deviations, if these are known.
 
         The noise becomes white, with their root mean square as its standard deviation, which is not
@@ -134,7 +153,8 @@ class Experiment:
         """
         if sd is None:
             return self
-        return replace(self, sd=sd, noise_sd=float(np.sqrt(np.mean(sd**2))) if known else None)
+        noise_sd = float(np.sqrt(np.mean(sd**2))) if known else None
+        return replace(self, sd=sd, correlation=correlation, noise_sd=noise_sd)
 
     @property
     def offset_and_drift(self) -> int:
@@ -170,7 +190,8 @@ class Experiment:
     @property
     def plain(self) -> bool:
         """True if noise is assumed to be white, and gripper and protocol to be known exactly."""
-        return not (self.coloured or self.uncertain)
+        uncertain = self.uncertain or self.fit_contact or self.load_errors is not None
+        return not (self.coloured or uncertain)
 
     def of(
         self,
@@ -204,9 +225,9 @@ class Experiment:
 
     def rows_key(self, time_s: Array) -> Hashable:
         """Return what the rows of a trace depend on, whose times are (n_samples,)."""
-        sd, record = (None if of is None else of.tobytes() for of in (self.sd, self.record))
-        held = self.phases, record, self.instrument, self.offset, self.drift
-        return *held, sd, time_s.tobytes()
+        arrays = self.sd, self.correlation, self.record
+        held = self.phases, self.instrument, self.offset, self.drift
+        return *held, *(None if of is None else of.tobytes() for of in arrays), time_s.tobytes()
 
     def for_model(self, problem: TraceProblem, model: SampleModel) -> TraceProblem:
         """Return one of its problems posed for another model; both share rows of the trace."""
@@ -235,6 +256,8 @@ class Experiment:
         uncertain = nuisance[:0] if uncertain is None else uncertain
         rows = SweptRows if self.torque.sweeps else Condensed
         given = self.torque, self.torque.snapped(time_s)
+        if noise_model is None and self.sd is not None and self.correlation is not None:
+            return rows(*given, nuisance[:0], PairWhitening(time_s, self.sd, self.correlation))
         if noise_model is None and self.sd is not None:
             noise_model, growing = WEIGHTED, self.sd
         if noise_model is None:

@@ -209,15 +209,19 @@ def best_of_starts(
     for group in alike(problems):
         fits, traces = LocalFits([problems[index] for index in group]), np.arange(len(group))
         rough, trace, fine, trace_of_fine = _finished(fits, [starts[index] for index in group])
-        winners = np.concatenate([_best(fine, trace_of_fine == own, 1) for own in traces])
+        winners = np.concatenate([_best(fine, trace_of_fine == in_group, 1) for in_group in traces])
         best = fits.in_order(fine[winners])
-        for own, index in enumerate(group.tolist()):
-            rows = _descents(rough[trace == own], before[index])
-            finished = _count_responses(fine)[trace_of_fine == own].sum()
-            misfit, evaluations = float(best.misfit[own]), rows[-1][3] + int(finished)
-            rows[-1] = np.exp(best.x[own]), misfit, misfit, evaluations
+        for in_group, index in enumerate(group.tolist()):
+            rows = _descents(rough[trace == in_group], before[index])
+            finished = _count_responses(fine)[trace_of_fine == in_group].sum()
+            misfit, evaluations = float(best.misfit[in_group]), rows[-1][3] + int(finished)
+            rows[-1] = np.exp(best.x[in_group]), misfit, misfit, evaluations
             progress(evaluations, misfit)
-            steps, why, converged = len(rows) - 1, "all starts fitted", bool(best.converged[own])
+            steps, why, converged = (
+                len(rows) - 1,
+                "all starts fitted",
+                bool(best.converged[in_group]),
+            )
             given = rows[-1][0], misfit, steps, evaluations, why, History.of(rows), converged
             answers[index] = Fit(*given)
     return [answers[index] for index in range(len(problems))]
@@ -227,37 +231,37 @@ def _finished(
     fits: LocalFits, starts: Sequence[Array]
 ) -> tuple[Minima, IntArray, Minima, IntArray]:
     """Fit roughly from all starts, then finely from the best; return both with their traces."""
-    trace = np.repeat(np.arange(len(starts)), [len(own_starts) for own_starts in starts])
+    trace = np.repeat(np.arange(len(starts)), [len(of_trace) for of_trace in starts])
     rough = fits.fitted(np.concatenate(starts), trace, ROUGH)
     # Rough fits show which basins are deepest; only the best are continued to the optimum.
-    best = [_best(rough, trace == own, FINISHED) for own in range(len(starts))]
+    best = [_best(rough, trace == number, FINISHED) for number in range(len(starts))]
     finalists = np.concatenate(best)
     return rough, trace, fits.fitted(rough.x[finalists], trace[finalists]), trace[finalists]
 
 
-def _best(found: Minima, which: BoolArray, count: int) -> IntArray:
+def _best(minima: Minima, which: BoolArray, count: int) -> IntArray:
     """Return the indices of the best fits among those that `which` marks."""
     chosen = np.flatnonzero(which)
-    order = np.argsort(found.misfit[chosen].astype(np.float32), kind="stable")
+    order = np.argsort(minima.misfit[chosen].astype(np.float32), kind="stable")
     return chosen[order[:count]]
 
 
-def _descents(found: Minima, before: HistoryRow) -> list[HistoryRow]:
+def _descents(minima: Minima, before: HistoryRow) -> list[HistoryRow]:
     """Return the rows of a history: the given first one, and one for each fit."""
     rows, evaluations, best, ordered = [before], before[3], 0, list[float]()
-    ranks, responses = found.misfit.astype(np.float32), _count_responses(found)
-    for fit, misfit in enumerate(found.misfit.tolist()):
+    ranks, responses = minima.misfit.astype(np.float32), _count_responses(minima)
+    for fit, misfit in enumerate(minima.misfit.tolist()):
         evaluations += int(responses[fit])
         best = fit if ranks[fit] < ranks[best] else best
         insort(ordered, misfit)
         median = 0.5 * (ordered[fit // 2] + ordered[(fit + 1) // 2])
-        rows.append((np.exp(found.x[best]), float(found.misfit[best]), median, evaluations))
+        rows.append((np.exp(minima.x[best]), float(minima.misfit[best]), median, evaluations))
     return rows
 
 
-def _count_responses(found: Minima) -> IntArray:
+def _count_responses(minima: Minima) -> IntArray:
     """Return how many responses fits have computed: a linearisation is one and its derivatives."""
-    return found.evaluations * (1 + found.x.shape[1])
+    return minima.evaluations * (1 + minima.x.shape[1])
 
 
 def identify_from(problem: TraceProblem, start: Array) -> Fit:

@@ -56,7 +56,7 @@ class Rows:
     @classmethod
     def joined(cls, some: Sequence[Self]) -> Self:
         """Concatenate the rows of several objects."""
-        return cls(*map(np.concatenate, zip(*(each.parts for each in some), strict=True)))
+        return cls(*map(np.concatenate, zip(*(rows.parts for rows in some), strict=True)))
 
 
 @dataclass
@@ -180,16 +180,16 @@ def _advance(
         tried = constraint.restored(tried, problem, basic)
         possible = np.isfinite(tried[:, 0])
         tried = np.clip(np.where(possible[:, None], tried, x), state.low, state.high)
-    found = objective(tried, problem)
+    ahead = objective(tried, problem)
     predicted = -np.sum(step * (2 * reduced.gradient + _times(reduced.information, step)), axis=1)
-    gained = np.where(possible, normal.square_sum - found.square_sum, -np.inf)
+    gained = np.where(possible, normal.square_sum - ahead.square_sum, -np.inf)
     small = tolerance * normal.square_sum
     done = (np.abs(gained) <= small) & (predicted <= small)
     done |= (np.max(np.abs(step), axis=1) <= _STANDSTILL) | possible & np.all(tried == x, axis=1)
     _damp(state, gained, predicted)
     better = gained > 0
     state.x = np.where(better[:, None], tried, x)
-    pairs = zip(found.parts, normal.parts, strict=True)
+    pairs = zip(ahead.parts, normal.parts, strict=True)
     chosen = (np.where(better.reshape(-1, *[1] * (a.ndim - 1)), a, b) for a, b in pairs)
     state.normal = Normal(*chosen)
     return done

@@ -49,7 +49,7 @@ Worth = Callable[[str, int, Fits], bool]
 """Tells of a candidate, a trace, and the fits so far, if it is worth another."""
 
 
-def deepen(problems: Sequence[TraceProblem], found: Sequence[Fit]) -> list[Fit]:
+def deepen(problems: Sequence[TraceProblem], fits: Sequence[Fit]) -> list[Fit]:
     """Return the fits of traces by one model, or lower ones with another relaxation time.
 
     Random starts may all miss a basin in which an element hardly shows. So every spring and its
@@ -61,10 +61,10 @@ def deepen(problems: Sequence[TraceProblem], found: Sequence[Fit]) -> list[Fit]:
     dampers = {name: f"c{name[1:]}" for name in names if name[0] == "k" and name != "k_p"}
     pairs = [(names.index(k), names.index(c)) for k, c in dampers.items() if c in names]
     if not pairs or model.power_law:
-        return [*found]
+        return [*fits]
     springs = [spring for spring, _ in pairs]
-    starts = np.repeat(np.log([fit.parameters for fit in found]), len(pairs) * _TRIED_TIMES, axis=0)
-    every = starts.reshape(len(found), len(pairs), _TRIED_TIMES, len(names))
+    starts = np.repeat(np.log([fit.parameters for fit in fits]), len(pairs) * _TRIED_TIMES, axis=0)
+    every = starts.reshape(len(fits), len(pairs), _TRIED_TIMES, len(names))
     for trace, problem in enumerate(problems):
         times = problem.residuals.trace.time_s
         tried = np.log(np.geomspace(np.diff(times).min(), times[-1], _TRIED_TIMES))
@@ -72,14 +72,14 @@ def deepen(problems: Sequence[TraceProblem], found: Sequence[Fit]) -> list[Fit]:
             every[trace, place, :, spring] = np.mean(every[trace, place, 0, springs])
             every[trace, place, :, damper] = every[trace, place, 0, spring] + tried
         every[trace] = np.clip(every[trace], problem.low, problem.high)
-    which = np.repeat(np.arange(len(found)), len(pairs) * _TRIED_TIMES)
+    which = np.repeat(np.arange(len(fits)), len(pairs) * _TRIED_TIMES)
     ends = fit_from([problems[trace] for trace in which.tolist()], starts, roughly=True)
-    best = [*found]
+    best = [*fits]
     for trace, problem in enumerate(problems):
-        own = ends[which == trace]
-        lowest = int(np.argmin(own.misfit.astype(np.float32)))
-        if _is_noticeably_lower(float(own.misfit[lowest]), best[trace].misfit, problem):
-            best[trace] = _better_from(best[trace], problem, own.x[lowest])
+        of_trace = ends[which == trace]
+        lowest = int(np.argmin(of_trace.misfit.astype(np.float32)))
+        if _is_noticeably_lower(float(of_trace.misfit[lowest]), best[trace].misfit, problem):
+            best[trace] = _better_from(best[trace], problem, of_trace.x[lowest])
     return best
 
 
@@ -89,7 +89,7 @@ def fit_models(
     rngs: Mapping[str, Sequence[np.random.Generator]],
     done: Callable[[], None] = lambda: None,
     near: Mapping[str, Array] | None = None,
-    worth: Worth = lambda name, trace, found: True,
+    worth: Worth = lambda name, trace, fits: True,
 ) -> Fits:
     """Fit nested models to traces by least squares; return the best fits, by model and trace.
 
@@ -99,28 +99,31 @@ def fit_models(
     converged. Models are fitted in the order of their numbers of parameters, each to the traces
     that are `worth` it.
     """
-    found: Fits = {}
+    fits: Fits = {}
     for name in sorted(problems, key=_cost):
-        which = [trace for trace in range(len(problems[name])) if worth(name, trace, found)]
+        which = [trace for trace in range(len(problems[name])) if worth(name, trace, fits)]
         further = []
         for trace in which:
             problem = problems[name][trace]
-            of_contained = _of_contained(name, found, trace, problem.residuals.duration_s)
+            of_contained = _of_contained(name, fits, trace, problem.residuals.duration_s)
             points = [within_range(start, problem) for start in of_contained]
             points += [near[name][trace]] if near and name in near else []
             further.append(np.reshape(points, (-1, len(problem.low))))
-        own, (fewer, few) = settings, _FEWER_FOR_POWER_LAWS
+        budget, (fewer, few) = settings, _FEWER_FOR_POWER_LAWS
         if CANDIDATES[name].model.power_law:
-            own = LeastSquaresSettings(-(-own.candidates // fewer), -(-own.starts // few))
-        found[name] = {}
+            budget = LeastSquaresSettings(-(-budget.candidates // fewer), -(-budget.starts // few))
+        fits[name] = {}
         if which:
-            posed, random = [problems[name][it] for it in which], [rngs[name][it] for it in which]
-            fits = deepen(posed, identify_many(posed, own, random, silent, further))
-            found[name] = dict(zip(which, fits, strict=True))
+            posed, random = (
+                [problems[name][trace] for trace in which],
+                [rngs[name][trace] for trace in which],
+            )
+            of_name = deepen(posed, identify_many(posed, budget, random, silent, further))
+            fits[name] = dict(zip(which, of_name, strict=True))
         done()
-    _fit_again(problems, found)
-    _take_simpler(problems, found)
-    return {name: found[name] for name in problems}
+    _fit_again(problems, fits)
+    _take_simpler(problems, fits)
+    return {name: fits[name] for name in problems}
 
 
 def _cost(name: str) -> tuple[int, bool]:
@@ -129,11 +132,11 @@ def _cost(name: str) -> tuple[int, bool]:
     return len(model.names), model.power_law
 
 
-def _of_contained(name: str, found: Fits, trace: int, longest_s: float) -> Iterator[Array]:
+def _of_contained(name: str, fits: Fits, trace: int, longest_s: float) -> Iterator[Array]:
     """Yield nested optima as starts; what has vanished is noticeable, or hardly noticeable."""
     kinds = np.array([parameter.kind for parameter in CANDIDATES[name].model.parameters])
-    for inner in different_in(name, [other for other in found if trace in found[other]]):
-        parameters = as_richer(name, inner, found[inner][trace].parameters)
+    for inner in different_in(name, [other for other in fits if trace in fits[other]]):
+        parameters = as_richer(name, inner, fits[inner][trace].parameters)
         gone = (kinds != "exponent") & ((parameters == 0) | ~np.isfinite(parameters))
         for times in _AWAY_FROM_USUAL if gone.any() else (1.0,):
             start = parameters.copy()
@@ -145,47 +148,45 @@ def _of_contained(name: str, found: Fits, trace: int, longest_s: float) -> Itera
 
 def _usual(kind: str, kinds: Array, values: Array, there: BoolArray, longest_s: float) -> float:
     """Return the mean size of a kind's elements, or one that relaxes within the experiment."""
-    if np.any(own := there & (kinds == kind)):
-        return float(np.exp(np.mean(np.log(values[own]))))
+    if np.any(alike := there & (kinds == kind)):
+        return float(np.exp(np.mean(np.log(values[alike]))))
     others = values[there & (kinds != "exponent") & (values > 0)]
     relaxation_s = _USUAL_SHARE * longest_s if kind == "damping" else 1 / (_USUAL_SHARE * longest_s)
     return float(np.exp(np.mean(np.log(others)))) * relaxation_s
 
 
-def _fit_again(problems: Mapping[str, Sequence[TraceProblem]], found: Fits) -> None:
+def _fit_again(problems: Mapping[str, Sequence[TraceProblem]], fits: Fits) -> None:
     """Fit again, in place, models that fit worse than a nested one within their range."""
     for _ in range(_MOST_REFITS):
         news = False
-        for name, inner, trace in _worse(found):
+        for name, inner, trace in _worse(fits):
             problem = problems[name][trace]
-            parameters = as_richer(name, inner, found[inner][trace].parameters)
+            parameters = as_richer(name, inner, fits[inner][trace].parameters)
             if is_within(parameters, problem):
-                before = found[name][trace]
-                found[name][trace] = _better_from(
-                    before, problem, within_range(parameters, problem)
-                )
-                news |= found[name][trace] is not before
+                before = fits[name][trace]
+                fits[name][trace] = _better_from(before, problem, within_range(parameters, problem))
+                news |= fits[name][trace] is not before
         if not news:
             break
 
 
-def _take_simpler(problems: Mapping[str, Sequence[TraceProblem]], found: Fits) -> None:
+def _take_simpler(problems: Mapping[str, Sequence[TraceProblem]], fits: Fits) -> None:
     """Replace, in place, a richer model's result by a nested model's better optimum."""
-    for name, inner, trace in _worse(found):
-        simpler = found[inner][trace]
+    for name, inner, trace in _worse(fits):
+        simpler = fits[inner][trace]
         parameters = as_richer(name, inner, simpler.parameters)
         reached = simpler.converged and not is_within(parameters, problems[name][trace])
-        found[name][trace] = replace(
-            found[name][trace], parameters=parameters, misfit=simpler.misfit, converged=reached
+        fits[name][trace] = replace(
+            fits[name][trace], parameters=parameters, misfit=simpler.misfit, converged=reached
         )
 
 
-def _worse(found: Fits) -> Iterator[tuple[str, str, int]]:
+def _worse(fits: Fits) -> Iterator[tuple[str, str, int]]:
     """Yield model, nested model and trace where the nested one fits better; simple ones first."""
-    for name in found:
-        for inner in filter(found.__contains__, contained(name)):
-            for trace in filter(found[inner].__contains__, found[name]):
-                if _digits(found[inner][trace].misfit) < _digits(found[name][trace].misfit):
+    for name in fits:
+        for inner in filter(fits.__contains__, contained(name)):
+            for trace in filter(fits[inner].__contains__, fits[name]):
+                if _digits(fits[inner][trace].misfit) < _digits(fits[name][trace].misfit):
                     yield name, inner, trace
 
 
@@ -262,25 +263,25 @@ def ranked(candidates: Sequence[str], misfits: Sequence[float], samples: int) ->
 
 def _own_and_best(tried: Sequence[FittedModel], chosen: str) -> tuple[FittedModel, FittedModel]:
     """Return the chosen model and the one that BIC prefers to it, or itself."""
-    own = next(each for each in tried if each.candidate == chosen)
-    best = min(tried, key=lambda each: each.delta_bic)
-    simpler = len(best.model.names) < len(own.model.names)
+    chosen_fit = next(fitted for fitted in tried if fitted.candidate == chosen)
+    best = min(tried, key=lambda fitted: fitted.delta_bic)
+    simpler = len(best.model.names) < len(chosen_fit.model.names)
     needed = levels.WORTH_A_MENTION if simpler else levels.STRONG
-    return own, best if own.delta_bic >= needed else own
+    return chosen_fit, best if chosen_fit.delta_bic >= needed else chosen_fit
 
 
 def preferred(tried: Sequence[FittedModel], chosen: str) -> str | None:
     """Return the candidate that BIC prefers to the chosen model by more than chance, or None."""
-    own, best = _own_and_best(tried, chosen)
-    return None if best is own else best.candidate
+    chosen_fit, best = _own_and_best(tried, chosen)
+    return None if best is chosen_fit else best.candidate
 
 
 def preferred_simpler(tried: Sequence[FittedModel], chosen: str) -> str | None:
     """Return the candidate that BIC prefers, if it is simpler and fits about as well; else None."""
-    own, best = _own_and_best(tried, chosen)
-    more = len(own.model.names) - len(best.model.names)
+    chosen_fit, best = _own_and_best(tried, chosen)
+    more = len(chosen_fit.model.names) - len(best.model.names)
     # Difference of n ln(misfit^2), which leaves the number of parameters aside.
-    worse = own.delta_aic - best.delta_aic - 2 * more
+    worse = chosen_fit.delta_aic - best.delta_aic - 2 * more
     return best.candidate if more > 0 and worse <= levels.WORTH_A_MENTION else None
 
 
@@ -294,13 +295,13 @@ def one_branch_more(tried: Sequence[FittedModel], *, adequate: bool = True) -> s
 
     Where the best is not adequate, it is one more than the best Maxwell-Wiechert model.
     """
-    rich = [it for it in tried if it.model.free_branches and not it.model.power_law]
+    rich = [fitted for fitted in tried if fitted.model.free_branches and not fitted.model.power_law]
     among = tried if adequate else rich or tried
-    best = min(among, key=lambda each: each.delta_bic).candidate
+    best = min(among, key=lambda fitted: fitted.delta_bic).candidate
     names = (name for name in CANDIDATES if CANDIDATES[name].model.free_branches)
     richer = (name for name in names if list(CANDIDATES[name].model.contains)[:1] == [best])
     name = next(richer, None)
-    return None if name in {each.candidate for each in tried} else name
+    return None if name in {fitted.candidate for fitted in tried} else name
 
 
 def advice(
@@ -308,12 +309,12 @@ def advice(
 ) -> str:
     """State in a sentence whether BIC prefers another of the models tried, if adequate, to one."""
     count = len(tried) + spared
-    own, best = _own_and_best(tried, chosen)
-    title = own.model.title[0].upper() + own.model.title[1:]
-    if best is own:
+    chosen_fit, best = _own_and_best(tried, chosen)
+    title = chosen_fit.model.title[0].upper() + chosen_fit.model.title[1:]
+    if best is chosen_fit:
         return f"{title}: none of the {count} models tried suits the trace better."
     named = f"{best.model.title} (--model {best.candidate})"
-    lower = f"with a BIC lower by {plain(own.delta_bic)}"
+    lower = f"with a BIC lower by {plain(chosen_fit.delta_bic)}"
     if not adequate:
         return (
             f"None of the {count} models tried is adequate: the best of them, {named}, "
@@ -322,7 +323,7 @@ def advice(
     if preferred_simpler(tried, chosen):
         return f"A simpler model, {named}, fits as well, {lower}."
     lead = f"{named} is preferred, {lower}."
-    if len(best.model.names) == len(own.model.names):
+    if len(best.model.names) == len(chosen_fit.model.names):
         return f"{title} suits the trace less well: {lead}"
     return f"{title} is not adequate: {lead}"
 
@@ -346,7 +347,8 @@ class FittedModels:
     def lead(self) -> float:
         """How much lower than that of the chosen model the BIC of another is."""
         return max(
-            (own.delta_bic for own in self.tried if own.candidate == self.chosen), default=0.0
+            (fitted.delta_bic for fitted in self.tried if fitted.candidate == self.chosen),
+            default=0.0,
         )
 
     def data(self, *, rejected: bool) -> dict[str, Any]:
@@ -357,16 +359,16 @@ class FittedModels:
         """
         rows = [
             {
-                "model": each.candidate,
-                "title": each.model.title,
-                "parameters": len(each.model.names),
-                "misfit_rad": self.answers[each.candidate].misfit,
-                "vanished": vanished(each.candidate, self.answers[each.candidate]),
-                "converged": self.answers[each.candidate].converged,
-                "delta_aic": each.delta_aic,
-                "delta_bic": each.delta_bic,
+                "model": fitted.candidate,
+                "title": fitted.model.title,
+                "parameters": len(fitted.model.names),
+                "misfit_rad": self.answers[fitted.candidate].misfit,
+                "vanished": vanished(fitted.candidate, self.answers[fitted.candidate]),
+                "converged": self.answers[fitted.candidate].converged,
+                "delta_aic": fitted.delta_aic,
+                "delta_bic": fitted.delta_bic,
             }
-            for each in self.tried
+            for fitted in self.tried
         ]
         words = None
         if rows and (not rejected or fits_far_better(self.tried, self.chosen)):
@@ -385,4 +387,8 @@ def vanished(candidate: str, answer: Fit) -> list[str]:
     """Name the elements that vanish in the best fit: parameters that are zero or infinite."""
     gone = (answer.parameters == 0) | np.isinf(answer.parameters)
     elements = zip(CANDIDATES[candidate].model.parameters, gone, strict=True)
-    return [each.name for each, is_gone in elements if is_gone and each.kind != "exponent"]
+    return [
+        parameter.name
+        for parameter, is_gone in elements
+        if is_gone and parameter.kind != "exponent"
+    ]

@@ -71,9 +71,9 @@ class Fit:
         """Return a copy with Maxwell branches sorted by relaxation time, in its history as well."""
         way = self.history.best_parameters
         ordered = np.take_along_axis(way, model.in_order(way), axis=1)
-        found = self.parameters[model.in_order(self.parameters[None])[0]]
+        parameters = self.parameters[model.in_order(self.parameters[None])[0]]
         history = replace(self.history, best_parameters=ordered)
-        return replace(self, parameters=found, history=history)
+        return replace(self, parameters=parameters, history=history)
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,11 @@ class GeneRange(Block):
     first_digit: Annotated[int, Field(ge=0, le=1)] = 1
     """Lowest value of the first digit g₂, if the others' is no higher. With 0 there are smaller
     numbers, and several ways to encode one."""
+    bits: Annotated[int, Field(ge=0, le=20)] = 0
+    """Number of genes that are bits of the logarithm between the ends of the range, in the place of
+    exponent and digits; with 0 there are none."""
+    gray: bool = False
+    """Neighbouring numbers differ by one bit (Gray's code)."""
 
     def complaints(self) -> Iterator[Complaint]:
         """Find bounds in the wrong order, and a range of a single value."""
@@ -40,14 +45,19 @@ class GeneRange(Block):
             yield (), f"{text} given under the case's key fixed."
 
     @property
+    def bounds(self) -> tuple[tuple[int, ...], tuple[int, ...]]:
+        """Smallest and largest value of each gene."""
+        return (self.bits * (0,), self.bits * (1,)) if self.bits else (self.least, self.most)
+
+    @property
     def least(self) -> tuple[int, ...]:
-        """Smallest value of each gene."""
+        """Smallest value of exponent and digits."""
         first = max(self.digit[0], self.first_digit)
         return self.exponent[0], first, *[self.digit[0]] * (self.digits - 1)
 
     @property
     def most(self) -> tuple[int, ...]:
-        """Largest value of each gene."""
+        """Largest value of exponent and digits."""
         return self.exponent[1], *[self.digit[1]] * self.digits
 
     @property

@@ -12,14 +12,20 @@ from functools import partial
 import numpy as np
 
 import biogrip.levels as levels
-from biogrip.arrays import Array, BoolArray
+from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.digits import counted, rounded
 from biogrip.fit.experiment import Experiment, pose
 from biogrip.fit.least_squares import fit_from, identify_many
 from biogrip.fit.nested_fits import deepen
-from biogrip.fit.noise_model_fit import NoiseModelLikelihood, growth_left, outliers_of
+from biogrip.fit.noise_model_fit import (
+    NoiseModelLikelihood,
+    absorbed,
+    growth_left,
+    outliers_of,
+)
 from biogrip.fit.problem import Fit, ReportProgress, TraceProblem, silent
 from biogrip.physics.noise import NoiseModel, drift_is_flow
+from biogrip.physics.protocol import Phase, join_phases
 from biogrip.physics.simulation import simulated_response
 
 # Square of three standard uncertainties.
@@ -68,7 +74,98 @@ def gripper_functions(experiment: Experiment, time_s: Array, parameters: Array) 
     return np.vstack((0.5 * (above - below), _SECOND_ORDER * second))
 
 
+def contact_function(experiment: Experiment, time_s: Array, parameters: Array) -> Array:
+    """Compute the change of a reading by the depth of a tip, over that, (n_times,)."""
+    assert experiment.record is not None
+    assert experiment.tip_power is not None
+    network = experiment.searched.network(parameters)
+    step = _OF_DEPTH * float(np.abs(experiment.record[:, 1]).max()) ** (1 / experiment.tip_power)
+    ends = [
+        simulated_response(experiment.gripper, network, moved.torque, time_s)[0]
+        for moved in (replace(experiment, deeper=experiment.deeper + by) for by in (step, -step))
+    ]
+    return (ends[0] - ends[1]) / (2 * step)
+
+
+def load_functions(
+    experiment: Experiment, time_s: Array, parameters: Array, sensitivity: Array
+) -> Array:
+    """Compute what errors of a smoothed load add to readings, (n_functions, n_times).
+
+    Those that show most have functions of their own. Of the others that is told by which they move
+    parameters, with slopes (n_parameters, n_times): they hardly differ from noise otherwise.
+    """
+    if experiment.load_errors is None:
+        return sensitivity[:0]
+    shown = _shown_of_errors(experiment, time_s, parameters)
+    shown = shown[np.argsort(-np.linalg.norm(shown, axis=1), kind="stable")]
+    most, rest = np.split(shown, [_MOST_FUNCTIONS])
+    basis = absorbed(sensitivity)
+    return np.vstack((most, np.linalg.qr(rest @ basis.T, mode="r") @ basis))
+
+
+def noise_beside(residual: Array, functions: Array, free: int) -> float:
+    """Return the noise beside functions of random amplitude, (n_functions, n_samples).
+
+    With its standard deviation, chi^2 of the residual, (n_samples,), is its degrees of freedom.
+    """
+    from scipy.optimize import brentq
+
+    _, sizes, directions = np.linalg.svd(functions, full_matrices=False)
+    within = (directions @ residual) ** 2
+    rest = max(float(residual @ residual - within.sum()), 0.0)
+
+    def excess(log_sd: float) -> float:
+        variance = float(np.exp(2 * log_sd))
+        return float(np.sum(within / (variance + sizes**2))) + rest / variance - free
+
+    most = 0.5 * float(np.log(residual @ residual / free))
+    return float(np.exp(brentq(excess, most - _EFOLDS, most)))
+
+
+def _shown_of_errors(experiment: Experiment, time_s: Array, parameters: Array) -> Array:
+    """Return responses to the errors of a record, (n_directions, n_times).
+
+    Each is a sum of ramps from row to row, whose response is interpolated between lags.
+    """
+    assert experiment.record is not None
+    assert experiment.load_errors is not None
+    rows = _thinned(len(experiment.record))
+    row_s, errors = experiment.record[rows, 0], experiment.load_errors[:, rows]
+    # Nothing is there before the first row, and a step is a steep ramp.
+    least_s = _STEEP * float(np.median(np.diff(row_s)))
+    row_s = np.insert(row_s, 0, row_s[0] - least_s)
+    errors, lasts_s = np.pad(errors, ((0, 0), (1, 0))), np.maximum(np.diff(row_s), least_s)
+    slopes = np.diff(errors) / lasts_s
+    some_s = time_s[_thinned(len(time_s))]
+    longest_s = max(float(some_s[-1] - row_s[0]), float(lasts_s.sum()))
+    lags_s = np.append(0.0, np.geomspace(least_s, longest_s, _LAGS))
+    phases = (Phase(2 * longest_s, 0.0, 1.0),)
+    course = join_phases(phases, deforms=experiment.instrument.deforms)
+    network = experiment.searched.network(parameters)
+    given = experiment.gripper, network, course, lags_s
+    of_ramp = simulated_response(*given)[0]
+    began, ended = (
+        np.interp(np.subtract.outer(some_s, at_s), lags_s, of_ramp)
+        for at_s in (row_s[:-1], row_s[:-1] + lasts_s)
+    )
+    shown = (began - ended) @ slopes.T
+    return np.array([np.interp(time_s, some_s, each) for each in shown.T])
+
+
+def _thinned(count: int) -> IntArray:
+    """Return places of at most so many rows, spread evenly."""
+    return np.unique(np.linspace(0, count - 1, min(count, _ROWS_SHOWN)).astype(np.int64))
+
+
 _MOST_ROUNDS = 5
+# Errors of a load with functions of their own; rows and readings that are looked at; lags of the
+# response to a ramp; how long a step lasts, over the time from row to row.
+_MOST_FUNCTIONS, _ROWS_SHOWN, _LAGS, _STEEP = 300, 3000, 1000, 1e-6
+# Step of differences, as a share of the largest depth; size of a free function over the noise.
+_OF_DEPTH, _FREE_OVER_NOISE = 1e-3, 1e5
+# Most e-folds by which noise is smaller beside them.
+_EFOLDS = 12.0
 # Changes of noise shares and times below this change no confidence limit in its third digit.
 _NOISE_SETTLED = 1e-2
 # The same of a fit that moves by less, in standard deviations.
@@ -149,33 +246,33 @@ def fit_least_squares(
 
     def find(problems: Sequence[TraceProblem], which: Sequence[int]) -> list[Fit]:
         of_traces = [rngs[trace] for trace in which]
-        found = identify_many(problems, experiments[0].least_squares, of_traces, progress)
-        return deepen(problems, found)
+        fits = identify_many(problems, experiments[0].least_squares, of_traces, progress)
+        return deepen(problems, fits)
 
     plain = [trace for trace, experiment in enumerate(experiments) if experiment.plain]
     problems = pose([experiments[trace] for trace in plain], [traces[trace] for trace in plain])
     optima = find(problems, plain) if plain else []
-    found = {
+    fits_by_trace = {
         trace: TraceFit(problem, optimum, None, np.zeros(len(traces[trace][0]), dtype=bool))
         for trace, problem, optimum in zip(plain, problems, optima, strict=True)
     }
     for trace, experiment in enumerate(experiments):
-        if trace not in found:
+        if trace not in fits_by_trace:
             alone = partial(find, which=[trace])
-            found[trace] = _fit_in_noise(experiment, *traces[trace], alone)
-    return [found[trace] for trace in range(len(traces))]
+            fits_by_trace[trace] = _fit_in_noise(experiment, *traces[trace], alone)
+    return [fits_by_trace[trace] for trace in range(len(traces))]
 
 
 def _fit_in_noise(experiment: Experiment, time_s: Array, readings: Array, find: Find) -> TraceFit:
-    kept, plain, found = _without_outliers(experiment, time_s, readings, find)
+    kept, plain, best_fit = _without_outliers(experiment, time_s, readings, find)
     time_s, readings = time_s[kept], readings[kept]
-    problem, found, noise_model, errors = _in_turn(experiment, time_s, readings, plain, found)
+    problem, best_fit, noise_model, errors = _in_turn(experiment, time_s, readings, plain, best_fit)
     # Slow deviations now weigh less, so that another basin may be the deepest.
     (other,) = find([problem])
-    if np.float32(other.misfit) < np.float32(found.misfit):
-        found = other
+    if np.float32(other.misfit) < np.float32(best_fit.misfit):
+        best_fit = other
     along = _terms_fitted_along(experiment, time_s)
-    return TraceFit(problem, found, noise_model, ~kept, errors, along)
+    return TraceFit(problem, best_fit, noise_model, ~kept, errors, along)
 
 
 def _terms_fitted_along(experiment: Experiment, time_s: Array) -> str:
@@ -195,17 +292,17 @@ def _without_outliers(
     """Strike outliers, if the noise may have any, and fit again, until there are no more."""
     kept, plain = np.ones(len(time_s), dtype=bool), experiment.of(time_s, readings)
     for _ in range(_MOST_ROUNDS):
-        (found,) = find([plain])
+        (best_fit,) = find([plain])
         if not experiment.coloured:
             break
-        residual = plain.residuals.left(np.log(found.parameters))
-        growth = growth_left(plain.residuals, np.log(found.parameters))
+        residual = plain.residuals.left(np.log(best_fit.parameters))
+        growth = growth_left(plain.residuals, np.log(best_fit.parameters))
         struck = outliers_of(residual / growth, plain.residuals.trace.rounding)
         if not struck.any():
             break
         kept[np.flatnonzero(kept)[struck]] = False
         plain = experiment.of(time_s[kept], readings[kept])
-    return kept, plain, found
+    return kept, plain, best_fit
 
 
 def _in_turn(
@@ -213,18 +310,26 @@ def _in_turn(
     time_s: Array,
     readings: Array,
     plain: TraceProblem,
-    found: Fit,
+    best_fit: Fit,
 ) -> tuple[TraceProblem, Fit, NoiseModel | None, tuple[float, float]]:
     """Estimate the noise from the residuals and fit again with it, until the fit converges."""
     problem, noise_model = plain, None
-    growth = growth_left(plain.residuals, np.log(found.parameters))
+    growth = growth_left(plain.residuals, np.log(best_fit.parameters))
     grows = experiment.coloured and np.ptp(growth) > 0
     for _ in range(_MOST_ROUNDS):
-        start = np.log(found.parameters)
+        start = np.log(best_fit.parameters)
         residual, sensitivity = plain.residuals(start)
-        uncertain = gripper_functions(experiment, time_s, found.parameters)
-        left = problem.residuals.free - len(found.parameters)
-        noise_sd = experiment.noise_sd or found.misfit * np.sqrt(len(time_s) / left)
+        of_load = load_functions(experiment, time_s, best_fit.parameters, sensitivity)
+        uncertain = gripper_functions(experiment, time_s, best_fit.parameters)
+        uncertain = np.vstack((uncertain, of_load))
+        if experiment.fit_contact:
+            of_contact = contact_function(experiment, time_s, best_fit.parameters)
+            free = _FREE_OVER_NOISE * np.linalg.norm(residual) / np.linalg.norm(of_contact)
+            uncertain = np.vstack((uncertain, free * of_contact))
+        left = problem.residuals.free - len(best_fit.parameters)
+        noise_sd = experiment.noise_sd or best_fit.misfit * np.sqrt(len(time_s) / left)
+        if len(of_load) and experiment.noise_sd is None:
+            noise_sd = noise_beside(residual, of_load, left)
         before: NoiseModel | None = noise_model
         growing = plain.residuals.response(start) if grows else None
         if experiment.coloured:
@@ -234,7 +339,7 @@ def _in_turn(
             noise_model = likelihood.best(near=before)
         condensed = experiment.in_noise(time_s, noise_model, uncertain / noise_sd, growing=growing)
         problem = experiment.of(time_s, readings, condensed=condensed)
-        found = found.at(fit := fit_from([problem], start))
+        best_fit = best_fit.at(fit := fit_from([problem], start))
         slopes = problem.residuals.condensed_responses(fit.x)[0, 1:]
         moved = np.linalg.norm((fit.x[0] - start) @ slopes) / noise_sd
         if moved < _FIT_SETTLED and _has_settled(before, noise_model):
@@ -244,7 +349,7 @@ def _in_turn(
         errors = likelihood.errors(noise_model)
         freedom = likelihood.freedom(noise_model, sensitivity / noise_sd, nuisance)
         problem = replace(problem, residuals=replace(problem.residuals, freedom=freedom))
-    return problem, found, noise_model, errors
+    return problem, best_fit, noise_model, errors
 
 
 def _has_settled(one: NoiseModel | None, other: NoiseModel | None) -> bool:

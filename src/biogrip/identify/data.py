@@ -1,11 +1,13 @@
 """A diagnosis as plain data in SI units: what JSON files, tables and pages have of it."""
 
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from biogrip.digits import counted, plain, round_increase
 from biogrip.fit.experiment import Experiment
+from biogrip.identify.contact import depth_limits
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.judging.doubts import REJECTED, REJECTION, find_reasons, order_notes
 from biogrip.judging.verdicts import FIT_REJECTED, Finding
@@ -37,11 +39,7 @@ def judged_data(diagnosis: Diagnosis) -> dict[str, Any]:
         "threshold": likelihood.threshold,
         "certainty": likelihood.certainty,
         "quantities": [_finding(each, rejected=rejected) for each in diagnosis.findings],
-        "hidden": [
-            {"words": each.words(), "moves": each.moves}
-            for each in diagnosis.hidden
-            if each.beyond[1] > 1
-        ],
+        "moves": [asdict(move) for move in diagnosis.moves],
         "trades": [
             {
                 "members": list(trade.members),
@@ -135,11 +133,17 @@ def _what_limits_include(experiment: Experiment) -> str:
     said = []
     if instrument.has_jaws and keys:
         said.append(f"Limits include uncertainties of the gripper: {', '.join(keys)}.")
-    if steps := len(experiment.uncertainty.get("steps", {})):
-        said.append(
-            f"Limits allow for {counted(steps, 'step')} of the {controlled} anywhere between the "
-            f"two rows of its record; otherwise the {exact} is taken as exact."
+    steps, allowed = len(experiment.uncertainty.get("steps", {})), []
+    if steps:
+        allowed.append(
+            f"{counted(steps, 'step')} of the {controlled} anywhere between the two rows of its "
+            "record"
         )
+    if experiment.load_errors is not None:
+        allowed.append(f"what is left of noise in the record of the {controlled}")
+    if allowed:
+        text = f"Limits allow for {' and for '.join(allowed)}"
+        said.append(f"{text}; otherwise the {exact} is taken as exact.")
     return " ".join(said) or f"Limits are statistical only: the {exact} is taken as exact."
 
 
@@ -152,6 +156,9 @@ def _fitted_along(
         found["onset_s"] = float(recording.onset_s or 0.0)
     if diagnosis.onset_limits_s:
         found["onset_limits_s"] = [found["onset_s"] + end_s for end_s in diagnosis.onset_limits_s]
+    if experiment.fit_contact:
+        value, *limits = depth_limits(diagnosis)
+        found |= {"contact_m": value, "contact_limits_m": limits}
     if not (experiment.offset or experiment.drift):
         return found
     time_s, measured = recording.time_s, recording.readings

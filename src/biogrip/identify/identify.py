@@ -18,6 +18,7 @@ from biogrip.digits import counted
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.problem import ReportProgress, silent
 from biogrip.fit.trace_fit import TraceFit
+from biogrip.identify.contact import notes_on_contact
 from biogrip.identify.other_fits import (
     Trace,
     fits_of,
@@ -30,6 +31,7 @@ from biogrip.identify.other_fits import (
 from biogrip.identify.prepare import prepare
 from biogrip.judging.diagnosis import Diagnosis, diagnose_all, with_times
 from biogrip.judging.doubts import DOUBT, HARMLESS, ROUNDED, Note, find_slow_misfit, name_suspects
+from biogrip.judging.linearity import notes_on_gains
 from biogrip.judging.onset import notes_on_start, profile_over_onset
 from biogrip.traces.reader import Recording
 
@@ -65,12 +67,11 @@ def identify_alike(
     *,
     progress: ReportProgress = silent,
     doing: Callable[[str], None] = lambda step: None,
-    valley: bool = False,
 ) -> list[Diagnosis]:
     """Identify prepared traces of the same `budget`, each as if it were alone.
 
-    `doing` is told of each of the `STEPS`. If `valley` is true, chi^2 is mapped over exchangeable
-    parameters. A `BiogripError` says that one of the traces cannot be fitted.
+    `doing` is told of each of the `STEPS`. A `BiogripError` says that one of the traces cannot be
+    fitted.
     """
     experiments = [experiment for _, experiment in traces]
     first, count = experiments[0], sum(len(recording.time_s) for recording, _ in traces)
@@ -81,13 +82,12 @@ def identify_alike(
         [fit.problem for fit in fits],
         [fit.found for fit in fits],
         confidence=first.confidence,
-        valley=valley,
     )
     if not first.simulated:
         doing("trying other sample models")
         models = models_tried(traces, fits, judged)
         judged = [
-            replace(judge_again(fit, own, tried, valley=valley), models=tried)
+            replace(judge_again(fit, own, tried), models=tried)
             for fit, own, tried in zip(fits, judged, models, strict=True)
         ]
         judged = with_times(judged)
@@ -122,7 +122,9 @@ def _notes_on_trace(
     yield from on_fit
     if experiment.instrument.sweeps:
         return
-    start = notes_on_start(experiment, recording.time_s, recording.readings, judged)
+    yield from notes_on_gains(judged.likelihood, judged.notes)
+    start = [*notes_on_contact(replace(judged, recording=recording, experiment=experiment))]
+    start = start or notes_on_start(experiment, recording.time_s, recording.readings, judged)
     yield from start
     rounded = any(note.about == ROUNDED and note.weight == DOUBT for note in judged.notes)
     # Beside another start, or errors of rounding, an offset and a drift mean nothing.

@@ -259,9 +259,7 @@ def _most(experiment: Experiment, fit: TraceFit) -> int:
     return fit.problem.residuals.free - experiment.fit_start - 1
 
 
-def judge_again(
-    fit: TraceFit, diagnosis: Diagnosis, models: FittedModels, *, valley: bool
-) -> Diagnosis:
+def judge_again(fit: TraceFit, diagnosis: Diagnosis, models: FittedModels) -> Diagnosis:
     """Diagnose a trace again if its own model was fitted better, within the search range, since.
 
     Return the new diagnosis, or the one so far, with a note if the lower chi^2 is outside the
@@ -273,8 +271,7 @@ def judge_again(
     if is_within(own.parameters, fit.problem):
         # Models are compared by nine digits of their misfits: an optimum that is shown has all.
         own = own.at(fit_from([fit.problem], np.log(own.parameters)))
-        confidence = diagnosis.likelihood.confidence
-        return diagnose(fit.problem, own, confidence=confidence, valley=valley)
+        return diagnose(fit.problem, own, confidence=diagnosis.likelihood.confidence)
     gone = vanished(models.chosen, own)
     where = f", without {' and '.join(gone)}" if gone else ""
     text = (

@@ -60,6 +60,7 @@ def check_recording(
     """
     torque, instrument = experiment.torque, experiment.instrument
     _check_times(recording, torque)
+    _check_contact(recording)
     time_s, trace = recording.time_s, recording.readings
     # Of any sample the largest static rotation: phi_2 = (1 - x) tau/k_2, where x goes from 0
     # without a sample to 1 with a rigid one.
@@ -174,6 +175,22 @@ def _check_times(recording: Recording, torque: Course) -> None:
         f"{clock_s[-1]:g} s of the protocol's {end_s:g} s, allowed are at least {shortest:g} s of "
         f"it.{hint}"
     )
+
+
+def _check_contact(recording: Recording) -> None:
+    """Refuse a tip that reads most where its load, before the contact, counts as zero."""
+    load, columns = recording.load, recording.read
+    if load is None or not columns.has_tip:
+        return
+    at = int(np.argmax(np.abs(recording.readings)))
+    there_s = float(recording.time_s[at]) + (recording.onset_s or 0.0)
+    if np.interp(there_s, *load.T) == 0 < np.max(load[:, 1]):
+        raise BiogripError(
+            f"{recording.place(at, columns.reading_column)}: found the largest reading where the "
+            f"column '{columns.load}' is not above zero, as of a separation that is negative in "
+            f"contact; allowed is a depth or a force of a tip in contact: turn it by "
+            f"{columns.said_by('load_scale')}."
+        )
 
 
 def _check_turn(

@@ -20,15 +20,17 @@ import biogrip.levels as levels
 from biogrip.arrays import Array
 from biogrip.digits import plain
 from biogrip.errors import BiogripError
-from biogrip.fit.any_sample import proportional_deviations, swept_deviations
+from biogrip.fit.any_sample import proportional_deviations
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.search_range import GeneRange
-from biogrip.identify.load_noise import tare_of, without_noise
+from biogrip.fit.swept_noise import estimate_swept_noise
+from biogrip.identify.contact import with_contact
+from biogrip.identify.load_noise import with_its_steps, without_noise
 from biogrip.identify.plausibility import check_moduli, check_recording
-from biogrip.judging.onset import OnsetFits, estimate_onset
+from biogrip.judging.onset import OnsetFits, begins_constant, estimate_onset
 from biogrip.physics.fractional import LONGEST_S, SHORTEST_S
 from biogrip.physics.noise import MOST_SAMPLES, drift_is_flow, estimate_noise, measure_rounding
-from biogrip.physics.protocol import Course, is_held, largest_load, with_steps
+from biogrip.physics.protocol import Course, evaluate, is_held, largest_load
 from biogrip.traces.columns import place
 from biogrip.traces.reader import Recording
 
@@ -56,24 +58,14 @@ def prepare(recording: Recording, experiment: Experiment) -> tuple[Recording, Ex
     A `BiogripError` has file, line and column of what is impossible with instrument and protocol.
     """
     if experiment.record is not None:
-        record, uncertain_s = with_steps(experiment.record)
-        steps = {str(number): error for number, error in enumerate(uncertain_s.tolist())}
-        uncertainty = {**experiment.uncertainty, "steps": steps}
-        if steps:
-            # A log may write all of them alike, as in the first row after each.
-            uncertainty["all steps"] = {"share": 1.0}
-        experiment = replace(experiment, record=record, uncertainty=uncertainty)
-        if tare := tare_of(experiment, recording):
-            controlled = experiment.instrument.controlled
-            size = f"{plain(tare)} {controlled.unit}".rstrip()
-            said = f"Taken off the {controlled.name}, a tare that readings do not follow: {size}."
-            recording = replace(recording, remarks_before=(*recording.remarks_before, said))
-            experiment = replace(experiment, record=record - (0.0, tare))
+        experiment, recording = with_its_steps(experiment, recording)
+    experiment, recording = _with_share(experiment, recording)
     recording = _checked(recording, experiment)
     if experiment.record is not None:
-        record, noise = without_noise(experiment, recording.time_s, recording.readings)
-        experiment = replace(experiment, record=record)
-        recording = replace(recording, load_noise=noise)
+        experiment, recording = without_noise(experiment, recording)
+    experiment, recording = _with_zero(experiment, recording)
+    if experiment.fit_contact:
+        experiment = with_contact(for_trace(experiment, recording), recording)
     experiment = for_trace(experiment, recording)
     if experiment.fit_start and recording.onset_s is not None:
         fits = OnsetFits(experiment, recording.time_s, recording.readings)
@@ -83,11 +75,55 @@ def prepare(recording: Recording, experiment: Experiment) -> tuple[Recording, Ex
     return recording, experiment
 
 
+def _with_share(experiment: Experiment, recording: Recording) -> tuple[Experiment, Recording]:
+    """Take standard deviations that are a share of each reading for that of the smooth course.
+
+    A reading that is low by chance would weigh more, and all of them be too low by twice the square
+    of the share.
+    """
+    if recording.sd is None or not np.all(recording.readings):
+        return experiment, recording
+    shares = recording.sd / np.abs(recording.readings)
+    share = float(np.median(shares))
+    if np.any(np.abs(shares - share) > levels.SAME_SHARE * share):
+        return experiment, recording
+    said = (
+        f"Standard deviations are {plain(100 * share, 2)} % of each reading: that is taken of the "
+        "smooth course, as readings that are low by chance would weigh more."
+    )
+    recording = replace(recording, sd=None, remarks_before=(*recording.remarks_before, said))
+    return replace(experiment, noise_share=share), recording
+
+
+def _with_zero(experiment: Experiment, recording: Recording) -> tuple[Experiment, Recording]:
+    """Fit an offset along where rows before the load tell it, and say so.
+
+    With the rows in the trace, limits allow for what they leave uncertain of the zero.
+    """
+    told = experiment.offset or "offset" not in experiment.undeclared
+    if told or experiment.simulated or experiment.instrument.sweeps:
+        return experiment, recording
+    begins_s = 0.0
+    if experiment.record is not None:
+        loads = np.abs(evaluate(experiment.torque, experiment.record[:, 0]))
+        begins_s = float(experiment.record[np.argmax(loads > levels.NO_LOAD * loads.max()), 0])
+    if not begins_constant(recording.time_s, recording.readings, begins_s):
+        return experiment, recording
+    before = recording.readings[recording.time_s < begins_s][:-1]
+    read, unit = recording.read.instrument.read, recording.units[1]
+    zero = f"{plain(read.in_unit(float(np.mean(before)), unit))} {unit}".removesuffix(" 1")
+    rows = f"{len(before)} rows before the {experiment.instrument.controlled.name}"
+    said = (*recording.remarks_before, f"Zero from {rows}: {zero}, taken off.")
+    recording = replace(recording, remarks_before=said)
+    return replace(experiment, offset=True), recording
+
+
 def for_trace(experiment: Experiment, recording: Recording) -> Experiment:
     """Return the experiment with what follows from a recording: see `prepare`."""
     if experiment.coloured:
         experiment = _without_likenesses(experiment, recording.time_s)
-    experiment = experiment.weighted(recording.sd, known=recording.sd_known)
+    known, correlation = recording.sd_known, recording.correlation
+    experiment = experiment.weighted(recording.sd, known=known, correlation=correlation)
     ranges = ranges_of(experiment, recording.time_s, recording.readings)
     found = {name: it for name, it in ranges.items() if name not in experiment.given_ranges}
     return replace(experiment, ranges={**experiment.ranges, **found})
@@ -131,27 +167,30 @@ def _checked(trace: Recording, experiment: Experiment) -> Recording:
                 f"{place(trace.path)}: found {1 / longest_s:.3g} to {1 / shortest_s:.3g} rad/s, "
                 f"allowed with {experiment.model.name} are {1 / LONGEST_S:g} to {1 / SHORTEST_S:g}."
             )
-        return _with_deviations(trace, share, experiment.noise_sd)
-    if suspicion := check_recording(trace, experiment, _noise(trace, experiment)):
+        return _with_deviations(trace, experiment)
+    zeroed, _ = _with_zero(experiment, trace)
+    if suspicion := check_recording(trace, zeroed, _noise(trace, experiment)):
         trace = replace(trace, remarks_before=(*trace.remarks_before, suspicion))
     if share is None:
         return trace
     return replace(trace, sd=proportional_deviations(experiment, trace.time_s, trace.readings))
 
 
-def _with_deviations(sweep: Recording, share: float | None, noise_sd: float | None) -> Recording:
+def _with_deviations(sweep: Recording, experiment: Experiment) -> Recording:
     """Return a sweep with standard deviations of its readings, or of their ratios."""
-    known = noise_sd if sweep.sd is None and share is None else sweep.sd
-    check_moduli(sweep, 0.0 if known is None else known)
-    if known is not None:
+    share, noise_sd = experiment.noise_share, experiment.noise_sd
+    if (known := noise_sd if sweep.sd is None and share is None else sweep.sd) is not None:
+        check_moduli(sweep, known)
         return sweep
-    sd, shares = swept_deviations(sweep.time_s, sweep.readings, share, noise_sd or 0.0)
+    sizes = [size for size in (share, sweep.read.phase_sd_rad) if size is not None]
+    noise = estimate_swept_noise(sweep.time_s, sweep.readings, sizes or None, noise_sd or 0.0)
+    check_moduli(sweep, noise.sd)
+    sweep = replace(sweep, sd=noise.sd, correlation=noise.correlation)
     if share is not None:
-        return replace(sweep, sd=sd)
-    percents = [f"{plain(100 * of, 2)} % of the {name} modulus" for name, of in shares.items()]
-    how = f"as they scatter from one frequency to the next: by {' and '.join(percents)}"
+        return sweep
+    how = f"as they scatter from one frequency to the next: by {noise.words}"
     said = (*sweep.remarks_before, f"Readings are weighted {how}.")
-    return replace(sweep, sd=sd, sd_known=False, remarks_before=said)
+    return replace(sweep, sd_known=False, remarks_before=said)
 
 
 def without_steps(trace: Recording, protocol: Course) -> Recording:

@@ -223,9 +223,9 @@ class ConstrainedFits:
         last_s = self._residuals.duration_s
         given = self.quantities, which, targets, low, high, last_s, self._unit[trace]
         constraint = QuantityConstraint(*given)
-        found = self._fits.fitted(near, trace, tolerance, constraint=constraint)
-        price = constraint.price(found.x) * self._ratio[trace]
-        return self._increases(found, trace) + price, found.x
+        minima = self._fits.fitted(near, trace, tolerance, constraint=constraint)
+        price = constraint.price(minima.x) * self._ratio[trace]
+        return self._increases(minima, trace) + price, minima.x
 
     def from_each(
         self, profile: IntArray, targets: Array, starts: Array, tolerance: float
@@ -248,11 +248,11 @@ class ConstrainedFits:
         """
         trace = np.zeros(len(x), dtype=np.int64)
         low, high = (np.where(fixed, x, end[0]) for end in (self._fits.low, self._fits.high))
-        found = self._fits.fitted(x, trace, tolerance, low=low, high=high)
-        return self._increases(found, trace), found.x
+        minima = self._fits.fitted(x, trace, tolerance, low=low, high=high)
+        return self._increases(minima, trace), minima.x
 
-    def _increases(self, found: Minima, trace: IntArray) -> Array:
-        excess = found.misfit**2 - self._misfit[trace] ** 2
+    def _increases(self, minima: Minima, trace: IntArray) -> Array:
+        excess = minima.misfit**2 - self._misfit[trace] ** 2
         return self._residuals.samples * excess / self._noise_sd[trace] ** 2
 
     def slowest(self, profile: int) -> float | None:

@@ -14,7 +14,6 @@ comes below the optimum, all is done again from there. Then notes are taken, in 
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import Any
 
 import numpy as np
 
@@ -38,11 +37,10 @@ from biogrip.judging.doubts import (
     compute_status,
     examine_residuals,
 )
-from biogrip.judging.hidden import Hidden, find_hidden
 from biogrip.judging.likelihood import Likelihood, check_rows, make_likelihood
-from biogrip.judging.profiles import compute_valley
 from biogrip.judging.quantities import characteristic_times, parameters_and_sum
 from biogrip.judging.verdicts import DETERMINED, Finding, Trade, compute_findings, find_trade_offs
+from biogrip.judging.what_moves import Move, find_moves
 from biogrip.judging.without_model import KINDS, WithoutModel, tell_without_model, times_told
 from biogrip.physics.sample_model import C_P
 from biogrip.physics.simulation import Grip
@@ -62,10 +60,8 @@ class Diagnosis:
     """A verdict on every parameter and on the sum of the exchangeable ones."""
     trades: list[Trade] = field(default_factory=list)
     """Parameters of which only a combination is determined."""
-    valley: dict[str, Any] | None = None
-    """Map of chi^2 over two exchangeable parameters, see `compute_valley`, if it is asked for."""
     lowest: Array | None = None
-    """Log-parameters at which profiles or valley come below the best fit."""
+    """Log-parameters at which profiles come below the best fit."""
     converged: bool = True
     """False if the best fit has not converged."""
     grip: Grip | None = None
@@ -104,62 +100,60 @@ class Diagnosis:
         """
         residuals = self.likelihood.problem.residuals
         tell = partial(tell_without_model, confidence=self.likelihood.confidence, kinds=kinds)
-        found = tell(residuals, at_s=at_s)
+        told = tell(residuals, at_s=at_s)
         if self.onset_limits_s:
-            starts, times = map(residuals.later, self.onset_limits_s), times_told(*found.covered_s)
-            found = found.widened([tell(start, at_s=at_s or times) for start in starts])
-        beyond_noise = found.misfit**2 - residuals.noise_scale**2
+            starts, times = map(residuals.later, self.onset_limits_s), times_told(*told.covered_s)
+            told = told.widened([tell(start, at_s=at_s or times) for start in starts])
+        beyond_noise = told.misfit**2 - residuals.noise_scale**2
         far_off = beyond_noise > (levels.FAR_OFF * residuals.peak) ** 2
-        hopeless = far_off and not found.is_linear and self.status == REJECTED
-        return replace(found, told=[]) if hopeless else found
+        hopeless = far_off and not told.is_linear and self.status == REJECTED
+        return replace(told, told=[]) if hopeless else told
 
     @cached_property
-    def hidden(self) -> list[Hidden]:
-        """Errors that the trace could hide, none of a rejected fit, see `find_hidden`."""
-        none = self.status == REJECTED or self.likelihood.problem.residuals.course.sweeps
-        return [] if none else find_hidden(self.likelihood, self.findings)
+    def moves(self) -> list[Move]:
+        """What errors of the instrument do to determined quantities, none of a rejected fit."""
+        of = [each.quantity for each in self.findings if each.verdict == DETERMINED]
+        if self.status == REJECTED or not of:
+            return []
+        return find_moves(self.likelihood, of, start_fitted=self.onset_limits_s is not None)
 
     def __repr__(self) -> str:
         """Return status and verdicts, a line each."""
-        lines = (f"  {each.quantity.label}  {each.words()}" for each in self.findings)
+        lines = (f"  {finding.quantity.label}  {finding.words()}" for finding in self.findings)
         return "\n".join([f"fit {self.status}", *lines])
 
 
-def diagnose(
-    problem: TraceProblem, found: Fit, *, confidence: float, valley: bool = False
-) -> Diagnosis:
+def diagnose(problem: TraceProblem, fit: Fit, *, confidence: float) -> Diagnosis:
     """Judge the identification of one trace by profile likelihoods, as `diagnose_all` does."""
-    return diagnose_all([problem], [found], confidence=confidence, valley=valley)[0]
+    return diagnose_all([problem], [fit], confidence=confidence)[0]
 
 
 def diagnose_all(
     problems: Sequence[TraceProblem],
-    found: Sequence[Fit],
+    fits: Sequence[Fit],
     *,
     confidence: float,
-    valley: bool = False,
 ) -> list[Diagnosis]:
     """Judge the identification of each of several traces, by one model, by profile likelihoods.
 
-    No diagnosis depends on the other traces. Found are their global optima, as far as is known. The
+    No diagnosis depends on the other traces. Fits are their global optima, as far as is known. The
     noise of a trace, if its standard deviation is not known, is that of the residual. Limits have a
-    confidence, e.g. 0.95. If `valley` is true, chi^2 is mapped over exchangeable parameters, too.
+    confidence, e.g. 0.95.
     """
 
     def profile(likelihoods: Sequence[Likelihood]) -> list[Diagnosis]:
         model = problems[0].residuals.model
         every = compute_findings(likelihoods, parameters_and_sum(model))
         trades = map(find_trade_offs, likelihoods, every)
-        found = list(map(profiled, likelihoods, every, trades))
-        return [_with_valley(each) for each in found] if valley else found
+        return list(map(profiled, likelihoods, every, trades))
 
-    judged = settled(problems, found, profile, confidence=confidence)
-    return [_with_notes(each, find_notes()) for each, find_notes in judged]
+    judged = settled(problems, fits, profile, confidence=confidence)
+    return [_with_notes(diagnosis, find_notes()) for diagnosis, find_notes in judged]
 
 
 def settled(
     problems: Sequence[TraceProblem],
-    found: Sequence[Fit],
+    fits: Sequence[Fit],
     profile: Callable[[Sequence[Likelihood]], list[Diagnosis]],
     *,
     confidence: float,
@@ -174,7 +168,7 @@ def settled(
     Returns diagnoses, without notes, and what finds those of 1. See `diagnose_all` for the
     parameters.
     """
-    best, done = list(found), dict[int, tuple[Diagnosis, FindNotes]]()
+    best, done = list(fits), dict[int, tuple[Diagnosis, FindNotes]]()
     while left := [trace for trace in range(len(problems)) if trace not in done]:
         examined = []
         for trace in left:
@@ -197,11 +191,11 @@ def settled(
     return [done[trace] for trace in range(len(problems))]
 
 
-def _lower_fit(judged: Diagnosis, found: Fit) -> Fit | None:
+def _lower_fit(judged: Diagnosis, fit: Fit) -> Fit | None:
     """Return the fit from the lowest point of the profiles, if it is below the best fit."""
     if judged.lowest is None:
         return None
-    missed = found.at(fit_from([judged.likelihood.problem], judged.lowest))
+    missed = fit.at(fit_from([judged.likelihood.problem], judged.lowest))
     return None if judged.likelihood.increase(missed.misfit) > -levels.MISSED else missed
 
 
@@ -213,12 +207,6 @@ def profiled(likelihood: Likelihood, findings: list[Finding], trades: list[Trade
     return Diagnosis(likelihood, findings, trades, lowest=missed)
 
 
-def _with_valley(judged: Diagnosis) -> Diagnosis:
-    """Return a diagnosis with its valley, whose lowest point counts if no profile is lower."""
-    valley, missed = compute_valley(judged.likelihood)
-    return replace(judged, valley=valley, lowest=missed if judged.lowest is None else judged.lowest)
-
-
 def with_times(diagnoses: Sequence[Diagnosis]) -> list[Diagnosis]:
     """Return diagnoses with findings on relaxation and retardation times after the others."""
     likelihoods = [diagnosis.likelihood for diagnosis in diagnoses]
@@ -226,7 +214,7 @@ def with_times(diagnoses: Sequence[Diagnosis]) -> list[Diagnosis]:
         return [*diagnoses]
     every = compute_findings(likelihoods, times)
     pairs = zip(diagnoses, every, strict=True)
-    return [replace(own, findings=[*own.findings, *found]) for own, found in pairs]
+    return [replace(diagnosis, findings=[*diagnosis.findings, *more]) for diagnosis, more in pairs]
 
 
 def _with_notes(judged: Diagnosis, of_rest: list[Note]) -> Diagnosis:
@@ -260,7 +248,7 @@ def _with_notes(judged: Diagnosis, of_rest: list[Note]) -> Diagnosis:
 
 def _too_slow(judged: Diagnosis) -> Iterator[Note]:
     """Yield a note if limits that allow for a misfit as slow as the trace are too wide."""
-    wide = any(each.verdict == DETERMINED and each.is_wide for each in judged.findings)
+    wide = any(finding.verdict == DETERMINED and finding.is_wide for finding in judged.findings)
     if judged.likelihood.independent < 1 and wide:
         yield Note(
             REJECTION,
@@ -298,7 +286,7 @@ def _ringing(judged: Diagnosis, *, rejected: bool) -> Iterator[Note]:
     likelihood = judged.likelihood
     residuals = likelihood.problem.residuals
     network = residuals.model.network(np.exp(likelihood.best))
-    damper = [each for each in judged.findings if each.quantity.label == C_P.name]
+    damper = [finding for finding in judged.findings if finding.quantity.label == C_P.name]
     if damper:
         network = replace(network, c_p=np.array([damper[0].low or 0.0]))
     misfit = rejected or np.isfinite(likelihood.independent)

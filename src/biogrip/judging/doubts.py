@@ -118,10 +118,10 @@ class _Left:
     def lines(self) -> list[str]:
         """Sentence on lines in the spectrum, if there is no other misfit.
 
-        Outliers have all frequencies, and sweeps none.
+        Outliers have all frequencies, and sweeps none. What a smoothed load leaves has its own.
         """
         residuals = self.likelihood.problem.residuals
-        if residuals.course.sweeps or self.struck.any():
+        if residuals.course.sweeps or residuals.course.smoothed or self.struck.any():
             return []
         rest, taken, named = self.bulk, self.basis, list[str]()
         unit, slowest = f" {residuals.instrument.read.unit}".rstrip(), np.inf
@@ -160,14 +160,14 @@ def examine_residuals(likelihood: Likelihood) -> tuple[Likelihood, FindNotes]:
     if misfit < least and estimate_noise(residual, rounding) < levels.NO_SCATTER * misfit:
         return likelihood, list
     growth = compute_growth(residual, residuals.response(likelihood.best), rounding)
-    directions = np.vstack((slopes, residuals.trace.condensed.nuisance)) if len(slopes) else slopes
+    directions = np.vstack((slopes, residuals.trace.condensed.taken)) if len(slopes) else slopes
     basis = absorbed(directions / growth)
     standard = residual / growth
     if np.ptp(growth):
         # What a fit with these weights would leave, to first order.
         standard = without(basis, standard)
     struck = outliers_of(whiteness.by_leverage(standard, basis), rounding)
-    if whiteness.far_out(standard, struck, basis) >= levels.FALSE_ALARM:
+    if whiteness.far_out(standard, struck, basis, residuals.freedom) >= levels.FALSE_ALARM:
         struck[:] = False
     # Outliers are noise of the recording: they make a fit doubtful, not wrong.
     basis = absorbed(basis[:, ~struck]) if struck.any() else basis
@@ -280,7 +280,10 @@ def name_suspects(residuals: Residuals, times: float, scale: float) -> str:
     fit = fit_any_sample(residuals)
     other, left = fit.sd / scale, fit.left_of_readings()
     least = plain(other, 2)
-    gives, culprits = "gives this trace under this protocol", "load, clock, contact or drift"
+    gives, culprits = (
+        "gives this trace under this protocol",
+        "load, clock, contact, drift, or a sample that is not linear",
+    )
     if residuals.course.sweeps:
         gives = "has both moduli (Kramers-Kronig)"
         _, culprits = whiteness.find_inertia(residuals, *left)

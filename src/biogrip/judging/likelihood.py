@@ -125,7 +125,7 @@ def check_rows(likelihood: Likelihood) -> None:
     of_readings = float(np.sqrt(np.mean(residuals.left(best) ** 2)))
     # A spring beside an offset may be as stiff as its range allows.
     both = residuals.trace.readings, residuals.response(best)
-    largest = max(float(np.max(np.abs(each))) for each in both)
+    largest = max(float(np.max(np.abs(readings))) for readings in both)
     rounding = _ERROR_OF_SUMS * residuals.samples * (largest / likelihood.noise_sd) ** 2
     apart = likelihood.increase(of_rows) - likelihood.increase(of_readings)
     if abs(apart) > levels.MISSED + rounding:
@@ -201,10 +201,10 @@ def covariance(
     unknown |= np.any(np.abs(parts[:, none]) > _NEGLIGIBLE * longest, axis=1)
     inverse = parts[:, ~none] / sizes[~none] @ directions[:, ~none].T
     scattered = inverse @ (j * (sigma / scale))
-    found: Array = scattered @ scattered.T
-    found[unknown] = found[:, unknown] = 0.0
-    found[unknown, unknown] = inf
-    return found
+    matrix: Array = scattered @ scattered.T
+    matrix[unknown] = matrix[:, unknown] = 0.0
+    matrix[unknown, unknown] = inf
+    return matrix
 
 
 def least_sd(
@@ -247,7 +247,9 @@ def headlines(bounds: Sequence[tuple[str, float]]) -> list[str]:
     for label, percent in bounds:
         if not math.isnan(percent):
             percents.setdefault(label, []).append(percent)
-    medians = sorted((float(np.median(found)), label) for label, found in percents.items())
+    medians = sorted(
+        (float(np.median(bounds_of_one)), label) for label, bounds_of_one in percents.items()
+    )
     parts = {part for label in percents if " + " in label for part in label.split(" + ")}
     determined = [
         label

@@ -6,7 +6,7 @@ rotation jumps between two readings, the misfit as a function of the onset has a
 it is minimised between neighbouring ones, from one interval to the next.
 
 `notes_on_start` tests if a trace begins before its protocol, or so long after it that the clock may
-be another's; it says what a tare would change, and a ramp before the first reading.
+be another's; it says what a ramp before the first reading would change.
 
 `profile_over_onset` takes the lowest of the profiles for single onsets, each in its increase over
 the best fit with the best onset. Onsets are taken all over their own confidence interval, closer at
@@ -20,7 +20,7 @@ from functools import cached_property, partial
 from itertools import pairwise
 
 import numpy as np
-from scipy.special import chdtri, stdtrit
+from scipy.special import chdtri
 
 import biogrip.levels as levels
 from biogrip.arrays import Array, IntArray, parts
@@ -37,7 +37,7 @@ from biogrip.judging.profiles import Profile, compute_profiles
 from biogrip.judging.verdicts import Finding
 from biogrip.physics.modes import lag_course
 from biogrip.physics.noise import estimate_noise, nuisance_basis, without
-from biogrip.physics.protocol import ramp
+from biogrip.physics.protocol import ramp, spacing_at
 
 _LAGS_A_DECADE = 2
 # Delays on the first grid; finer ones have as many between the neighbours of the best.
@@ -129,12 +129,6 @@ class OnsetFit:
     """Sample parameters, (n_parameters,)."""
     misfit: float
     """RMS misfit."""
-
-
-def spacing_at(time_s: Array, at_s: float) -> float:
-    """Return how far ascending times, (n,), are apart at one of them, or nearest to it, in s."""
-    after = int(np.clip(np.searchsorted(time_s, at_s), 1, len(time_s) - 1))
-    return float(time_s[after] - time_s[after - 1])
 
 
 @dataclass(frozen=True)
@@ -267,7 +261,7 @@ def notes_on_start(
     readings: Array,
     diagnosis: Diagnosis,
 ) -> list[Note]:
-    """Return notes on another start of the protocol than at 0, on a tare, and on a hidden ramp.
+    """Return notes on another start of the protocol than at 0, and on a ramp.
 
     A trace that begins constant, and fits far better with a later start, tells nothing of the
     sample under the protocol as given, whatever noise model absorbs the misfit: the test is a
@@ -279,19 +273,18 @@ def notes_on_start(
     notes: list[Note] = []
     if may_be_late and ramped and is_cut_off(time_s):
         notes += _about_clock(fits, diagnosis)
-    elif begins_constant(time_s, readings):
+    elif may_be_late and begins_constant(time_s, readings):
         # A constant that is not zero is an offset, with which the onset would be biased.
-        free, onset_s = replace(experiment, offset=True), 0.0
-        if may_be_late or experiment.fit_start:
-            onset_s = estimate_onset(experiment, time_s, readings)
+        free, onset_s = (
+            replace(experiment, offset=True),
+            estimate_onset(experiment, time_s, readings),
+        )
         if begins_constant(time_s, readings, onset_s):
-            if may_be_late:
-                notes += _about_late_onset(replace(fits, experiment=free), diagnosis, onset_s)
-            if not experiment.offset and (notes or not may_be_late):
-                notes += _about_tare(fits, diagnosis, onset_s)
+            notes += _about_late_onset(replace(fits, experiment=free), diagnosis, onset_s)
     if diagnosis.status != REJECTED and ramped and not notes:
         notes += _about_ramp(fits, diagnosis, ramped)
     smooth = experiment.record is not None and not experiment.uncertainty.get("steps")
+    smooth &= experiment.load_errors is None
     if smooth and not experiment.coloured and len(time_s) <= MANY:
         notes += _about_load(fits, diagnosis)
     return notes
@@ -323,19 +316,6 @@ def _about_late_onset(fits: OnsetFits, diagnosis: Diagnosis, guess_s: float) -> 
     )
 
 
-def _about_tare(fits: OnsetFits, diagnosis: Diagnosis, onset_s: float) -> Iterator[Note]:
-    """Yield a note if the readings before an onset are not zero, by a t test."""
-    before = fits.readings[fits.time_s < onset_s][:-1]
-    mean, error = float(np.mean(before)), float(np.std(before, ddof=1)) / np.sqrt(len(before))
-    if abs(mean) > error * stdtrit(len(before) - 1, 1 - levels.AS_GOOD / 2):
-        unit = f" {fits.experiment.instrument.read.unit}".rstrip()
-        yield Note(
-            REJECTION if diagnosis.status == REJECTED else DOUBT,
-            f"The {len(before)} readings before the start are constant, but {plain(mean)}{unit} "
-            "and not 0: if that is the zero of the instrument, say --offset (measurement.offset).",
-        )
-
-
 def _about_load(fits: OnsetFits, diagnosis: Diagnosis) -> Iterator[Note]:
     """Yield a note if a recorded load that comes earlier or later, by Newton steps, fits better."""
     given = other = fits.given(diagnosis.likelihood)
@@ -344,7 +324,7 @@ def _about_load(fits: OnsetFits, diagnosis: Diagnosis) -> Iterator[Note]:
         starts_s = other.onset_s, other.onset_s + _EARLIER * spacing_s
         here, later = (fits.posed(start_s).residuals for start_s in starts_s)
         residual, slopes = here(other.log_parameters)
-        basis = absorbed(np.vstack((slopes, here.trace.condensed.nuisance)))
+        basis = absorbed(np.vstack((slopes, here.trace.condensed.taken)))
         change = later.left(other.log_parameters) - residual
         moved = without(basis, change)
         told = float(moved @ moved)
@@ -459,46 +439,18 @@ def _moved(
 
 
 def _about_ramp(fits: OnsetFits, diagnosis: Diagnosis, ramped: Experiment) -> Iterator[Note]:
-    """Yield a note if a ramp up to the first reading moves a value out, or a short one before 0."""
+    """Yield a note if a ramp up to the first reading moves a value out of its limits."""
     best, delay_s = diagnosis.likelihood.best, float(fits.time_s[0])
     given = fits.given(diagnosis.likelihood)
     other = replace(fits, experiment=ramped).at(0.0, best)
-    said, how = [], "A ramp is given by a protocol (--config), or as recorded (--load)."
+    said, how = [], "A ramp is given by --ramp DURATION, or as recorded (--load)."
     if moved := _moved(diagnosis, given, [other], 1.0):
         ends = f"ends with the first reading, at {plain(delay_s)} s"
         said.append(f"If the load was no step but a ramp that {ends}: {moved}.")
     if ramped.record is not None:
         how = "Rows of the load before its first one would tell."
-    elif longest := _longest_ramp(fits, diagnosis, given):
-        name = fits.experiment.instrument.controlled.name
-        said.append(
-            f"The {name} is taken to rise at once: a ramp of more than {plain(longest[0], 2)} s "
-            f"before 0 s moves {longest[1]} beyond its limits."
-        )
     if said:
         yield Note(HARMLESS, " ".join([*said, how]))
-
-
-def _longest_ramp(
-    fits: OnsetFits, diagnosis: Diagnosis, given: OnsetFit
-) -> tuple[float, str] | None:
-    """Return what length of a ramp before a step moves which quantity to a limit, if it is short.
-
-    A ramp that ends at 0 is, to first order, a step halfway of it.
-    """
-    if len(fits.experiment.phases) > 1:
-        return None
-    earlier_s = _EARLIER * spacing_at(fits.time_s, 0.0)
-    earlier = fits.at(-earlier_s, given.log_parameters).log_parameters
-    lengths = []
-    for each in diagnosis.findings:
-        if each.low and each.high:
-            value, moved = (each.quantity.log(x) for x in (given.log_parameters, earlier))
-            room = min(abs(np.log(end) - value) for end in (each.low, each.high))
-            length_s = 2 * earlier_s * room / max(abs(moved - value), 1e-12)
-            lengths.append((length_s, each.quantity.label))
-    shortest = min(lengths, default=(np.inf, ""))
-    return shortest if shortest[0] < levels.SHORT_RAMP * fits.time_s[-1] else None
 
 
 def _with_ramp(experiment: Experiment, time_s: Array) -> Experiment | None:

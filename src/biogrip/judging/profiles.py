@@ -1,7 +1,5 @@
 """Profile likelihood: minimum of chi^2 over all parameters against one quantity [1]_, [2]_.
 
-`compute_valley` maps chi^2 over two exchangeable parameters: the valley in which they trade off.
-
 All quantities of many traces are profiled at once, over their whole search ranges. All points are
 fitted from the optimum, then from the fits of both neighbours, again and again where these have
 improved: a basin found anywhere in a profile is followed both ways. Where a profile exceeds the
@@ -18,16 +16,14 @@ References
 .. [3] M. Dowell and P. Jarratt, BIT 11 (1971), 168-174.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
 import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray, IntArray
-from biogrip.digits import round_increase, rounded
 from biogrip.fit.least_squares import FAIR, FINE, alike
 from biogrip.judging.constrained_fits import CLOSE, ConstrainedFits
 from biogrip.judging.likelihood import Likelihood
@@ -72,14 +68,14 @@ class Points:
         while np.any(news):
             start = np.tile(np.flatnonzero(news), 2)
             point = start + np.repeat((-1, 1), len(start) // 2)
-            own = to_fit[point] == self.profile[start]
-            news = self._try(point[own], start[own], CLOSE)
+            beside = to_fit[point] == self.profile[start]
+            news = self._try(point[beside], start[beside], CLOSE)
 
     def _try(self, point: IntArray, start: IntArray, tolerance: float) -> BoolArray:
         """Fit points from other points' fits; return a mask of those that have improved much."""
         profile, targets = self.profile[point], self.values[point]
-        found = self.fits.at(profile, targets, self.x[start], tolerance)
-        return keep_lower(self.increases, self.x, point, *found)
+        fits = self.fits.at(profile, targets, self.x[start], tolerance)
+        return keep_lower(self.increases, self.x, point, *fits)
 
     def ends(self) -> IntArray:
         """Return the indices of the first and last point of every profile, (2, n_profiles)."""
@@ -134,11 +130,13 @@ class Points:
 
 
 def keep_lower(
-    increases: Array, x: Array, point: IntArray, found: Array, fitted: Array
+    increases: Array, x: Array, point: IntArray, fitted_increases: Array, fitted: Array
 ) -> BoolArray:
     """Keep lower fits of points, one or more each, in place; return which improved much."""
     news = np.zeros(len(increases), dtype=bool)
-    for at, increase, parameters in zip(point.tolist(), found.tolist(), fitted, strict=True):
+    for at, increase, parameters in zip(
+        point.tolist(), fitted_increases.tolist(), fitted, strict=True
+    ):
         before = increases[at]
         if increase < before:
             news[at] |= increase < before - _LEAST_IMPROVEMENT * (1 + abs(increase))
@@ -184,28 +182,36 @@ def compute_profiles(
     likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity], *, smooth: bool = True
 ) -> list[list[Profile]]:
     """Compute profiles and limits by trace and quantity, with points for a drawing if `smooth`."""
-    found: dict[int, list[Profile]] = {}
+    by_trace: dict[int, list[Profile]] = {}
     count = len(quantities)
     for group in alike([likelihood.problem for likelihood in likelihoods]):
         fits = ConstrainedFits([likelihoods[index] for index in group], quantities)
-        own = _profiles(fits, smooth=smooth)
+        profiles = _profiles(fits, smooth=smooth)
         for place, index in enumerate(group.tolist()):
-            found[index] = own[place * count : (place + 1) * count]
-    return [found[index] for index in range(len(likelihoods))]
+            by_trace[index] = profiles[place * count : (place + 1) * count]
+    return [by_trace[index] for index in range(len(likelihoods))]
 
 
 def _profiles(fits: ConstrainedFits, *, smooth: bool) -> list[Profile]:
-    grids = [_grid_of(each, quantity) for each in fits.likelihoods for quantity in fits.quantities]
+    grids = [
+        _grid_of(likelihood, quantity)
+        for likelihood in fits.likelihoods
+        for quantity in fits.quantities
+    ]
     points = Points(fits, grids)
     points.from_optimum()
     points.from_neighbours()
     limits = _find_crossings(points).T
     if smooth:
         points.smooth(limits)
-    found = []
+    profiles = []
     for index, ends in enumerate(limits.tolist()):
-        own = points.profile == index
-        values, increases, x = points.values[own], points.increases[own], points.x[own]
+        in_profile = points.profile == index
+        values, increases, x = (
+            points.values[in_profile],
+            points.increases[in_profile],
+            points.x[in_profile],
+        )
         gaps = find_gaps(values, increases, float(fits.threshold[index]))
         lowest = x[int(np.argmin(increases))]
         short = (increases[[0, -1]] > fits.threshold[index]) & np.isnan(ends)
@@ -220,10 +226,10 @@ def _profiles(fits: ConstrainedFits, *, smooth: bool) -> list[Profile]:
         low, high = (None if np.isnan(end) or end in made else end for end in ends)
         if slowest_s is not None:
             low, high, gaps, certainty = None, None, (), None
-        found.append(
+        profiles.append(
             Profile(values, increases, best, low, high, lowest, gaps, certainty, slowest_s)
         )
-    return found
+    return profiles
 
 
 def _grid_of(likelihood: Likelihood, quantity: Quantity) -> Array:
@@ -243,24 +249,67 @@ def _find_crossings(points: Points) -> Array:
     end, profile = np.nonzero(points.increases[ends] > fits.certainty)
     while len(profile):
         below = np.flatnonzero(points.increases < fits.threshold[points.profile])
-        own = points.profile[below]
-        first, last = np.searchsorted(own, profile), np.searchsorted(own, profile, "right") - 1
+        of_below = points.profile[below]
+        first, last = (
+            np.searchsorted(of_below, profile),
+            np.searchsorted(of_below, profile, "right") - 1,
+        )
         inside = below[np.where(end == 0, first, last)]
         outside = np.where(end == 0, inside - 1, inside + 1)
         both = np.stack((inside, outside))
         values, increases, x = points.values[both], points.increases[both], points.x[both]
         elsewhere = points.extremes()[:, fits.trace[profile]]
-        found = crossings(fits, profile, values, increases, x, elsewhere)
-        crossed[end, profile] = found
+        limits = crossings(fits, profile, values, increases, x, elsewhere)
+        crossed[end, profile] = limits
         points.increases[both], points.x[both] = increases, x
         # Where the outer point has come below the threshold, the next bracket is further out.
-        on = np.isnan(found) & (outside != ends[end, profile])
+        on = np.isnan(limits) & (outside != ends[end, profile])
         end, profile = end[on], profile[on]
     return crossed
 
 
 # Most fits for a crossing, and the width of an interval in which a profile jumps.
 _MOST_FITS_OF_CROSSING, _WIDTH_OF_JUMP = 40, 1e-7
+
+
+class _Brackets:
+    """Inner and outer ends of n crossings: values, excesses of the root of chi^2, nearest fits.
+
+    Inner ends are below the threshold, (2, n), and outer ones above.
+    """
+
+    def __init__(self, threshold: Array, values: Array, increases: Array, x: Array) -> None:
+        self.threshold, self._root_threshold = threshold, np.sqrt(threshold)
+        self.values, self.x = values.copy(), x.copy()
+        every = np.arange(len(threshold))
+        self.excess = np.stack([self.excess_of(of_end, every) for of_end in increases])
+        self._moved = np.full(len(threshold), -1)
+
+    def excess_of(self, increases: Array, which: IntArray) -> Array:
+        """Return roots of increases of chi^2 minus that of the threshold, (n,)."""
+        return np.sqrt(np.maximum(increases, 0.0)) - self._root_threshold[which]
+
+    def width(self, which: IntArray) -> Array:
+        """Return the distances between both ends, (n,)."""
+        return np.abs(self.values[1, which] - self.values[0, which])
+
+    def between(self, which: IntArray) -> tuple[Array, Array]:
+        """Return values where excesses, joined by lines, vanish, and parameters there."""
+        share = self.excess[0, which] / (self.excess[0, which] - self.excess[1, which])
+        tried = self.values[0, which] + share * (self.values[1, which] - self.values[0, which])
+        return tried, self.x[0, which] + share[:, None] * (self.x[1, which] - self.x[0, which])
+
+    def move(self, which: IntArray, tried: Array, over: Array, fitted: Array) -> None:
+        """Move an end to tried values, by the Illinois rule.
+
+        The excess of an end that stays a second time is halved, so that the end moves, too.
+        """
+        side = (over > 0).astype(np.int64)
+        self.values[side, which], self.excess[side, which] = tried, over
+        self.x[side, which] = fitted
+        again = self._moved[which] == side
+        self.excess[1 - side[again], which[again]] *= 0.5
+        self._moved[which] = side
 
 
 def crossings(
@@ -273,51 +322,52 @@ def crossings(
 ) -> Array:
     """Find the logarithms of quantities at which the increase of chi^2 equals the threshold, (n,).
 
-    Each is between an inner end, below the threshold, and an outer, above it. Of these there are
-    the logarithms `values` and the `increases`, (2, n), and the fits `x`, (2, n, n_parameters).
-    Starts from `elsewhere`, (n_starts, n, n_parameters), may lead to deeper basins. Lower fits that
-    are found at outer ends replace theirs, in place. NaN is where a deeper basin is below the
-    threshold there, so that the crossing lies further out.
+    1. A value is tried between an inner end, below the threshold, and an outer, above it.
+    2. It is fitted from both ends and between: they may lie in different basins, of which the
+       deeper one counts. At first the best fit from elsewhere is one more start.
+    3. Where the basin is deeper than that of the outer end, the outer end is fitted from there.
+    4. One end of each bracket moves to the value, until the threshold or a jump is met.
+
+    Parameters
+    ----------
+    profile
+        Profile of each crossing, (n,).
+    values, increases, x
+        Logarithms, increases of chi^2 and fits of both ends, (2, n) or (2, n, n_parameters). Lower
+        fits that are found at outer ends replace theirs, in place.
+    elsewhere
+        Starts that may lead to deeper basins, (n_starts, n, n_parameters).
+
+    Returns
+    -------
+    Array
+        NaN where a deeper basin is below the threshold at the outer end: the crossing is further
+        out.
     """
-    threshold = fits.threshold[profile]
-    root_threshold = np.sqrt(threshold)
-    ends, near = values.copy(), x.copy()
-    excess = np.sqrt(np.maximum(increases, 0.0)) - root_threshold
-    moved = np.full(len(profile), -1)
-    found = ends[1].copy()
-    left = np.arange(len(profile))
-    for tries in range(_MOST_FITS_OF_CROSSING):
+    brackets = _Brackets(fits.threshold[profile], values, increases, x)
+    crossed, left = values[1].copy(), np.arange(len(profile))
+    for trial in range(_MOST_FITS_OF_CROSSING):
         if not len(left):
             break
-        share = excess[0, left] / (excess[0, left] - excess[1, left])
-        tried = ends[0, left] + share * (ends[1, left] - ends[0, left])
-        # The fits of the two ends may lie in different basins: the deeper one counts.
-        between = near[0, left] + share[:, None] * (near[1, left] - near[0, left])
-        starts = np.concatenate((between[None], near[:, left]))
-        # In the first round, the best fit from elsewhere is one more start.
-        if not tries:
+        tried, between = brackets.between(left)
+        starts = np.concatenate((between[None], brackets.x[:, left]))
+        if not trial:
             _, deepest = fits.from_each(profile, tried, elsewhere, FAIR)
             starts = np.concatenate((starts, deepest[None]))
         reached, fitted = fits.from_each(profile[left], tried, starts, FINE)
-        over = np.sqrt(np.maximum(np.min(reached, axis=0), 0.0)) - root_threshold[left]
-        # A basin deeper than that of the outer end may be deeper at the outer end, too.
-        missed = np.sqrt(np.maximum(reached[2], 0.0)) - root_threshold[left] > over + _ROOT_ERROR
+        over = brackets.excess_of(np.min(reached, axis=0), left)
+        missed = brackets.excess_of(reached[2], left) > over + _ROOT_ERROR
         if np.any(missed):
             outer = left[missed]
             beyond = fits.at(profile[outer], values[1, outer], fitted[missed], FINE)
             keep_lower(increases[1], x[1], outer, *beyond)
-        void = increases[1, left] < threshold[left]
-        found[left] = np.where(void, np.nan, tried)
-        side = (over > 0).astype(np.int64)
-        ends[side, left], excess[side, left], near[side, left] = tried, over, fitted
-        # The excess of an end that stays a second time is halved, so that the end moves, too.
-        again = moved[left] == side
-        excess[1 - side[again], left[again]] *= 0.5
-        moved[left] = side
+        void = increases[1, left] < brackets.threshold[left]
+        crossed[left] = np.where(void, np.nan, tried)
+        brackets.move(left, tried, over, fitted)
         # Where a deeper basin begins, the increase may jump past the threshold.
-        apart = np.abs(ends[1, left] - ends[0, left]) > _WIDTH_OF_JUMP
+        apart = brackets.width(left) > _WIDTH_OF_JUMP
         left = left[(np.abs(over) > _ROOT_ERROR) & apart & ~void]
-    return found
+    return crossed
 
 
 def find_gaps(
@@ -325,85 +375,11 @@ def find_gaps(
 ) -> tuple[tuple[float, float], ...]:
     """Find stretches above the threshold, with ends interpolated in the root of the increase."""
     roots = np.sqrt(np.maximum(increases, 0.0))
-    found = []
+    gaps = []
     for start, end in pairwise(np.flatnonzero(increases < threshold).tolist()):
         if end > start + 1 and increases[start + 1 : end].max() > levels.GAP * threshold:
             # Places for `np.interp` ascend from inside to outside.
             sides = [start, start + 1], [end, end - 1]
             first, last = (np.interp(np.sqrt(threshold), roots[of], log_values[of]) for of in sides)
-            found.append((float(first), float(last)))
-    return tuple(found)
-
-
-# Shares of the first damper in the sum, dense where either is small, and sums relative to the best
-# one, dense in the valley.
-_VALLEY_SHARES = 1 / (1 + np.exp(-np.linspace(-8.0, 8.0, 31)))
-_BESIDE_VALLEY = np.array([0.005, 0.01, 0.015, 0.02, 0.03, 0.05, 0.08, 0.12, 0.2, 0.3])
-_VALLEY_SUMS = np.concatenate((1 - _BESIDE_VALLEY[::-1], [1.0], 1 + _BESIDE_VALLEY))
-# Second arm of the valley: if the branch is too weak to show, the second damper alone is the sum.
-_ARM_FIRSTS = np.concatenate((np.arange(0.002, 0.1, 0.005), np.linspace(0.11, 1.2, 12)))
-_ARM_SECONDS = np.concatenate((np.arange(0.9, 1.06, 0.005), [1.08, 1.12, 1.2]))
-
-
-def compute_valley(likelihood: Likelihood) -> tuple[dict[str, Any] | None, Array | None]:
-    """Compute the increase of chi^2 over two exchangeable parameters, with the others fitted.
-
-    The first returned has ``x`` and ``y``, names and units; ``best``; and ``grids``, along the
-    valley of constant sum and its arm of constant second parameter: ``x_values``, ``y_values`` and
-    ``increases``. It is None unless just two, among others, were searched. The second is a missed
-    optimum, or None.
-    """
-    model = likelihood.problem.residuals.model
-    pair = [index for index, p in enumerate(model.parameters) if p.name in model.exchangeable]
-    if len(pair) != 2 or len(model.parameters) == 2:
-        return None, None
-    best = np.exp(likelihood.best[pair])
-    sums = best.sum() * _VALLEY_SUMS[:, None]
-    arm = np.meshgrid(best.sum() * _ARM_FIRSTS, best.sum() * _ARM_SECONDS)
-    grids, missed = [], None
-    for x_values, y_values in ((sums * _VALLEY_SHARES, sums * (1 - _VALLEY_SHARES)), arm):
-        increases, lower = _increases(likelihood, pair, x_values, y_values)
-        grid = {
-            "x_values": _rows_of(x_values, rounded),
-            "y_values": _rows_of(y_values, rounded),
-        }
-        grids.append({**grid, "increases": _rows_of(increases, round_increase)})
-        missed = missed if lower is None else lower
-    both = [model.parameters[index] for index in pair]
-    x, y = ({"name": p.name, "symbol": p.symbol, "unit": p.unit} for p in both)
-    at_best = [rounded(float(value)) for value in best]
-    return {"x": x, "y": y, "grids": grids, "best": at_best}, missed
-
-
-def _rows_of(values: Array, rounding: Callable[[float], float | None]) -> list[list[float | None]]:
-    return [[rounding(float(value)) for value in row] for row in values]
-
-
-def _increases(
-    likelihood: Likelihood, pair: list[int], x_values: Array, y_values: Array
-) -> tuple[Array, Array | None]:
-    """Compute the increase of chi^2 at every point of a grid, and find a missed optimum."""
-    fits = ConstrainedFits([likelihood], [])
-    rows, columns = x_values.shape
-    x = np.tile(likelihood.best, (rows * columns, 1))
-    x[:, pair[0]], x[:, pair[1]] = np.log(x_values.ravel()), np.log(y_values.ravel())
-    fixed = np.isin(np.arange(x.shape[1]), pair)
-    increases = np.full(len(x), np.inf)
-    points, start = np.arange(len(x)), x.copy()
-    # A point, and its neighbours on the grid.
-    beside = np.pad(points.reshape(rows, columns), 1, constant_values=-1)
-    shifts = ((0, 1), (2, 1), (1, 0), (1, 2))
-    neighbours = np.stack([beside[i : i + rows, j : j + columns].ravel() for i, j in shifts])
-    tolerance = FAIR
-    while len(points):
-        found = fits.with_fixed(start, fixed, tolerance)
-        news = keep_lower(increases, x, points, *found)
-        origin = np.repeat(np.flatnonzero(news), 4)
-        points = neighbours[:, news].T.ravel()
-        origin, points = origin[points >= 0], points[points >= 0]
-        start = x[origin].copy()
-        start[:, pair] = x[points][:, pair]
-        tolerance = CLOSE
-    lowest = int(np.argmin(increases))
-    missed = x[lowest] if increases[lowest] < -levels.MISSED else None
-    return increases.reshape(rows, columns), missed
+            gaps.append((float(first), float(last)))
+    return tuple(gaps)

@@ -41,12 +41,12 @@ class BranchPenalty:
 
     def form(self, n_parameters: int) -> Array:
         """Return the coefficients, (n_parameters,), of its log (relative) relaxation time."""
-        found = np.zeros(n_parameters)
+        coefficients = np.zeros(n_parameters)
         for branch, sign in ((self.branch, 1.0), (self.before, -1.0)):
             if branch is not None:
                 spring, damper = branch
-                found[damper], found[spring] = sign, -sign * self.power
-        return found
+                coefficients[damper], coefficients[spring] = sign, -sign * self.power
+        return coefficients
 
     def allowed(self, longest_s: float) -> float:
         """Return the largest such log time without penalty, for the length of an experiment."""
@@ -147,16 +147,19 @@ def characteristic_times(model: SampleModel) -> list[Quantity]:
     These are Maxwell branches and Kelvin-Voigt elements of which both parameters are searched. A
     spring and a damper that are parallel to a branch have no time of their own.
     """
-    found = []
+    times = []
     for damper, (letter, *index) in enumerate(name.split("_") for name in model.names):
         spring = "_".join(["k", *index])
         parallel = index == ["p"] and model.name != "kelvin_voigt"
         if letter != "c" or spring not in model.names or parallel or model.power_law:
             continue
-        pair, of_branch = (damper, model.names.index(spring)), "".join(f"_{{{it}}}" for it in index)
+        pair, of_branch = (
+            (damper, model.names.index(spring)),
+            "".join(f"_{{{digit}}}" for digit in index),
+        )
         label, symbol = "_".join(["tau", *index]), rf"$\tau{of_branch}$"
-        found.append(Quantity(label, symbol, "s", pair, sign=(1, -1), penalties=_ordered(model)))
-    return found
+        times.append(Quantity(label, symbol, "s", pair, sign=(1, -1), penalties=_ordered(model)))
+    return times
 
 
 def find_combinations(model: SampleModel, members: list[int]) -> list[Quantity]:
@@ -166,19 +169,19 @@ def find_combinations(model: SampleModel, members: list[int]) -> list[Quantity]:
     their relaxation time c/k. A springpot has none, as its exponent decides what it trades off
     against.
     """
-    found = []
+    combined = []
     ordered = _ordered(model)
     for a, b in combinations(members, 2):
         first, second = model.parameters[a], model.parameters[b]
         if not {first.kind, second.kind} <= {"stiffness", "damping"}:
             continue
         if first.kind == second.kind:
-            found += [_sum_of(model, (a, b)), _series_combination(model, (a, b))]
+            combined += [_sum_of(model, (a, b)), _series_combination(model, (a, b))]
         else:
             pair = (a, b) if first.kind == "damping" else (b, a)
             names, symbols, _ = _names_of(model, pair)
-            found.append(Quantity("/".join(names), "/".join(symbols), "s", pair, sign=(1, -1)))
-    return [replace(quantity, penalties=ordered) for quantity in found]
+            combined.append(Quantity("/".join(names), "/".join(symbols), "s", pair, sign=(1, -1)))
+    return [replace(quantity, penalties=ordered) for quantity in combined]
 
 
 def _ordered(model: SampleModel) -> tuple[BranchPenalty, ...]:
@@ -193,7 +196,7 @@ def _sum_of(model: SampleModel, members: tuple[int, ...]) -> Quantity:
 
 def _series_combination(model: SampleModel, members: tuple[int, ...]) -> Quantity:
     names, symbols, unit = _names_of(model, members)
-    label, symbol = (" + ".join(f"1/{each}" for each in texts) for texts in (names, symbols))
+    label, symbol = (" + ".join(f"1/{text}" for text in texts) for texts in (names, symbols))
     return Quantity(f"1/({label})", f"$1/($ {symbol} $)$", unit, members, -1)
 
 

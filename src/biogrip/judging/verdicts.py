@@ -146,12 +146,12 @@ def compute_findings(
     likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity], *, smooth: bool = True
 ) -> list[list[Finding]]:
     """Profile quantities in each of several traces, and reach a verdict on each of them."""
-    found = []
+    findings = []
     every = compute_profiles(likelihoods, quantities, smooth=smooth)
     for likelihood, profiles in zip(likelihoods, every, strict=True):
         deviations = map(likelihood.deviation, quantities)
-        found.append(list(map(Finding, quantities, profiles, deviations)))
-    return found
+        findings.append(list(map(Finding, quantities, profiles, deviations)))
+    return findings
 
 
 def find_trade_offs(likelihood: Likelihood, findings: Sequence[Finding]) -> list[Trade]:
@@ -160,7 +160,7 @@ def find_trade_offs(likelihood: Likelihood, findings: Sequence[Finding]) -> list
     Combinations among the findings come first. Of other pairs, the combination known best to first
     order is profiled, if it is worth a look.
     """
-    model, found = likelihood.problem.residuals.model, list[tuple[tuple[int, ...], Finding]]()
+    model, trades = likelihood.problem.residuals.model, list[tuple[tuple[int, ...], Finding]]()
     left = [
         finding.quantity.members[0]
         for finding in findings
@@ -169,16 +169,16 @@ def find_trade_offs(likelihood: Likelihood, findings: Sequence[Finding]) -> list
     for finding in findings:
         members = tuple(index for index in finding.quantity.members if index in left)
         if len(members) > 1:
-            found.append((members, finding))
+            trades.append((members, finding))
             left = [index for index in left if index not in members]
     for pair in combinations(left, 2):
         candidates = find_combinations(model, list(pair))
         best = min(candidates, key=likelihood.deviation, default=None)
         if best is not None and likelihood.deviation(best) < levels.WORTH_A_PROFILE:
             ((finding,),) = compute_findings([likelihood], [best])
-            found.append((pair, finding))
+            trades.append((pair, finding))
     return [
         Trade(tuple(model.parameters[index].name for index in members), finding)
-        for members, finding in found
+        for members, finding in trades
         if finding.verdict == DETERMINED
     ]

@@ -34,7 +34,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.special import betainc, betaincc, betaincinv, fdtrc, ndtr, ndtri, pdtrc, stdtr
+from scipy.special import betainc, betaincc, fdtrc, ndtr, ndtri, pdtrc, stdtr
 
 import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray, IntArray
@@ -76,6 +76,18 @@ def correlated(residual: Array, basis: Array) -> tuple[float, float]:
     return 1 - observed * free / first, chance
 
 
+def is_still(values: Array) -> bool:
+    """Return True if values only scatter about their mean, (n,): neither rise nor wander.
+
+    Of too few no trend is told, unless they are all the same.
+    """
+    if np.ptp(values) == 0:
+        return True
+    apart, basis = values - np.mean(values), np.full((1, len(values)), len(values) ** -0.5)
+    chances = correlated(apart, basis)[1], wandering(apart, basis)
+    return len(values) >= levels.FEWEST_STILL and min(chances) >= levels.FALSE_ALARM
+
+
 def wandering(residual: Array, basis: Array) -> float:
     """Return the chance of means over stretches of white noise that scatter as much.
 
@@ -102,20 +114,6 @@ def wandering(residual: Array, basis: Array) -> float:
         return 1.0
     # The share of the rest is small where that of the means is large.
     return _chance_of_less(1 - observed, free - first, free - 2 * first + second, free, 1.0)
-
-
-def averaged(basis: Array) -> Array:
-    """Return orthonormal rows of means over stretches that a fit does not absorb."""
-    n = basis.shape[1]
-    count = min(_STRETCHES, n // _SHORTEST)
-    if count < 2:
-        return np.zeros((0, n))
-    rows = np.zeros((count, n))
-    for row, part in zip(rows, np.array_split(np.arange(n), count), strict=True):
-        row[part] = len(part) ** -0.5
-    rest = without(basis, rows)
-    _, shares, found = np.linalg.svd(rest, full_matrices=False)
-    return found[shares > levels.TOLD]
 
 
 def _chance_of_less(observed: float, first: float, second: float, free: int, most: float) -> float:
@@ -180,8 +178,10 @@ def by_leverage(residual: Array, basis: Array) -> Array:
     return np.where(share > least, residual / np.sqrt(np.maximum(share, least)), residual)
 
 
-def far_out(residual: Array, struck: BoolArray, basis: Array) -> float:
+def far_out(residual: Array, struck: BoolArray, basis: Array, freedom: float = np.inf) -> float:
     """Return the chance that white noise has readings as far out as those that are struck.
+
+    The noise is known with this freedom at most.
 
     Their distances from the fit to the others, to first order, are in standard deviations of these,
     with Student's distribution [3]_. That of the nearest of them, and their number, have Poisson's
@@ -203,7 +203,10 @@ def far_out(residual: Array, struck: BoolArray, basis: Array) -> float:
     if not scale:
         return 1.0
     away = np.abs(apart) / np.sqrt(1 + np.sum(own * through, axis=0)) / scale
-    most, least = (2 * len(residual) * float(stdtr(free, -far)) for far in (away.max(), away.min()))
+    known = min(free, freedom)
+    most, least = (
+        2 * len(residual) * float(stdtr(known, -far)) for far in (away.max(), away.min())
+    )
     # Two tests, so each at half the level.
     chance = 2 * min(float(pdtrc(0, most)), float(pdtrc(count - 1, least)))
     return min(chance, 1.0)
@@ -304,14 +307,6 @@ class Steps:
         products -= np.einsum("ij,ij->i", self.taken[:-1], self.taken[1:])
         return np.clip(1 - products / (self.norms[:-1] * self.norms[1:]), 0.0, 1.0)
 
-    def critical(self, level: float) -> float:
-        """Return the distance in standard deviations at which a scan's chance is a level."""
-        from scipy.optimize import brentq
-
-        most = float(betaincinv(0.5, 0.5 * (self.freedom - 1), 1 - 1e-12))
-        share = brentq(lambda share: self.chance(share) - level, 1e-9, most)
-        return float(np.sqrt(share * self.freedom))
-
 
 def _density(level: Array | float) -> Array:
     """Return the density of the normal distribution."""
@@ -380,15 +375,18 @@ def parts_apart(basis: Array, split: int) -> Array:
     return absorbed(apart) if len(apart) else apart
 
 
-def compare_halves(residual: Array, basis: Array, split: int) -> float:
-    """Return the chance that parts of white noise before and after a reading differ as much."""
+def compare_halves(residual: Array, basis: Array, split: int, freedom: float = np.inf) -> float:
+    """Return the chance that parts of white noise before and after a reading differ as much.
+
+    The noise is known with this freedom at most.
+    """
     more = parts_apart(basis, split)
     left = len(residual) - len(basis) - len(more)
     if not len(more) or left < 1:
         return 1.0
     gained = float(np.sum((more @ residual) ** 2))
     rest = max(float(residual @ residual) - gained, 1e-300)
-    return float(fdtrc(len(more), left, gained / len(more) * left / rest))
+    return float(fdtrc(len(more), min(left, freedom), gained / len(more) * left / rest))
 
 
 def find_inertia(
@@ -401,7 +399,8 @@ def find_inertia(
     total, square = float(residual @ residual), float(shape @ shape)
     size = float(shape @ residual) / square
     explained = size**2 * square
-    if fdtrc(1, free - 1, explained * (free - 1) / (total - explained)) >= levels.FALSE_ALARM:
+    known = min(free - 1, residuals.freedom)
+    if fdtrc(1, known, explained * (free - 1) / (total - explained)) >= levels.FALSE_ALARM:
         what = "a column of something else, slip, too large a strain, or a sample that changed"
         return False, what
     part = plain(100 * abs(size) * float(places[-1]) ** 2 / float(residuals.trace.readings[-1]), 2)
@@ -422,9 +421,10 @@ def about_moduli(
     """
     storage = is_storage(residuals.trace.time_s)
     is_inertia, cause = find_inertia(residuals, residual, basis, growth)
+    chance = compare_halves(residual, basis, int(np.sum(~storage)), residuals.freedom)
     if is_inertia:
         yield f"The fit leaves what is of {cause}."
-    elif (chance := compare_halves(residual, basis, int(np.sum(~storage)))) < levels.FALSE_ALARM:
+    elif chance < levels.FALSE_ALARM:
         yield (
             "The storage and the loss modulus, each fitted by itself, differ by more than white "
             f"noise ({p_value(chance)}): {cause}."

@@ -26,7 +26,7 @@ References
 
 import math
 from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from itertools import pairwise
 from typing import Any
@@ -39,8 +39,10 @@ from biogrip.arrays import Array, BoolArray
 from biogrip.digits import plain, with_limits
 from biogrip.fit.any_sample import AnySampleFit, Lags, count_lags, fit_any_sample
 from biogrip.judging.verdicts import verdict_of
+from biogrip.judging.what_moves import Move, as_moves, find_mistakes
 from biogrip.judging.whiteness import as_correlated, correlated
 from biogrip.physics.residuals import Residuals
+from biogrip.physics.units import inverse_of, per_second_of
 
 # First digits of the times at which quantities are told and, where these are too few, of more.
 _FIRST_DIGITS, _FEWEST_TIMES = ((1,), (1, 2, 5)), 2
@@ -55,13 +57,6 @@ _INNER = 2.0
 # Standard deviation of a quantity that counts as none, over the largest that a noise of one lag
 # makes; and a quantity that does, over its standard deviation.
 _LEAST_DEVIATION, _NO_VALUE = 1e-3, 1e-15
-
-# Of moduli, compliances, their slopes, and viscosities: N and m, or Pa.
-_UNITS_TOLD = {
-    "N/m": ("N/m", "m/N", "m/(N s)", "N s/m"),
-    "Pa": ("Pa", "1/Pa", "1/(Pa s)", "Pa s"),
-    "": ("", "", "1/s", "s"),
-}
 
 LEVEL, EXPONENT, LOSS, BEYOND, FLOW = "level", "exponent", "loss", "beyond", "flow"
 KINDS = (LEVEL, EXPONENT, LOSS, BEYOND, FLOW, "storage", "loss tangent", "increment", "slope")
@@ -86,7 +81,7 @@ _ADDED: dict[str, _Added] = {
 
 
 @dataclass(frozen=True)
-class Estimate:
+class LinearLimits:
     """A quantity, and its limits over all linear samples."""
 
     quantity: str
@@ -123,7 +118,7 @@ class Estimate:
 class WithoutModel:
     """What a trace tells without a model."""
 
-    told: list[Estimate]
+    told: list[LinearLimits]
     """Quantities with their limits."""
     misfit: float
     """RMS of what the linear sample that fits best leaves, in the unit of the readings."""
@@ -133,16 +128,30 @@ class WithoutModel:
     """False if no linear sample gives this trace, for what the best leaves is no noise."""
     covered_s: tuple[float, float]
     """From when to when after a step there are readings, and so limits on either side."""
+    moves: list[Move] = field(default_factory=list)
+    """What errors of the instrument do to quantities that have a value."""
 
     def widened(self, others: Sequence["WithoutModel"]) -> "WithoutModel":
         """Return it with limits that hold those of others, too, as of other starts."""
         told = []
-        for own in self.told:
-            every = [own, *(it for of in others for it in of.told if it.quantity == own.quantity)]
-            lows, highs = np.array([(it.low, it.high) for it in every], dtype=float).T
+        for estimate in self.told:
+            every = [
+                estimate,
+                *(
+                    other
+                    for of in others
+                    for other in of.told
+                    if other.quantity == estimate.quantity
+                ),
+            ]
+            lows, highs = np.array([(other.low, other.high) for other in every], dtype=float).T
             ends = [lows.min(), highs.max()] if len(every) > len(others) else [np.nan, np.nan]
             low, high = (None if np.isnan(end) else float(end) for end in ends)
-            told.append(replace(own, value=own.value if low and high else None, low=low, high=high))
+            told.append(
+                replace(
+                    estimate, value=estimate.value if low and high else None, low=low, high=high
+                )
+            )
         return replace(self, told=told)
 
     def data(self) -> dict[str, Any]:
@@ -152,9 +161,10 @@ class WithoutModel:
             "times_noise": self.times_noise,
             "misfit_rad": self.misfit,
             "covered_s": list(self.covered_s),
+            "moves": [asdict(move) for move in self.moves],
             "quantities": [
-                {**asdict(each), "verdict": each.verdict, "in_words": each.words()}
-                for each in self.told
+                {**asdict(estimate), "verdict": estimate.verdict, "in_words": estimate.words()}
+                for estimate in self.told
             ],
         }
 
@@ -191,9 +201,29 @@ def tell_without_model(
         sd = fit.sd * math.sqrt(free / independent)
     root = partial(_root, confidence, freedom, float(sd / residuals.noise_scale))
     times_s = at_s or times_told(*fit.lags.covered_s)
-    quantities = (each for each in _quantities(residuals, fit.lags, times_s) if each.kind in kinds)
-    told = [_find_limits(fit, each, root) for each in quantities]
-    return WithoutModel(told, fit.misfit, times, is_linear, fit.lags.covered_s)
+    chosen = [each for each in _quantities(residuals, fit.lags, times_s) if each.kind in kinds]
+    told = [_find_limits(fit, each, root) for each in chosen]
+    moves = _moves(fit, [own for own, it in zip(chosen, told, strict=True) if it.value])
+    return WithoutModel(told, fit.misfit, times, is_linear, fit.lags.covered_s, moves)
+
+
+def _moves(fit: AnySampleFit, quantities: Sequence["_Functional"]) -> list[Move]:
+    """Return what errors of the instrument do to quantities.
+
+    It is half the difference of fits with the error added to the readings and taken off.
+    """
+    residuals = fit.lags.residuals
+    trace, mistakes = residuals.trace, list(find_mistakes(residuals, fit.response))
+
+    def values(added: Array) -> Array:
+        changed = replace(trace, readings=trace.readings + added)
+        other = fit_any_sample(replace(residuals, trace=changed))
+        return np.array([quantity.of(other) for quantity in quantities])
+
+    given = np.array([quantity.of(fit) for quantity in quantities])
+    moved = (values(mistake.change) - values(-mistake.change) for mistake in mistakes)
+    changes = np.array([0.5 * each / given for each in moved]).T
+    return as_moves(mistakes, [quantity.name for quantity in quantities], changes)
 
 
 def _root(confidence: float, freedom: float, sd: float, more: int) -> float:
@@ -251,16 +281,22 @@ class _Functional:
         below = self.below(at_s, lags.rates) if self.below else np.zeros_like(shown)
         return self.above(at_s, lags.rates) * shown, below * shown
 
+    def of(self, fit: AnySampleFit) -> float:
+        """Return what is told of a fit, NaN where it has none."""
+        above, below = (float(added @ fit.amplitudes) for added in self.added(fit.lags))
+        value = above / below if below else above if self.below is None else math.nan
+        return self.turned(value) if self.turned and value else value
+
 
 def _find_limits(
     fit: AnySampleFit, quantity: _Functional, root: Callable[[int], float]
-) -> Estimate:
+) -> LinearLimits:
     """Find the limits of a quantity that is not negative."""
     profile = _Excess(fit, quantity, root)
     value: float | None = profile.best
     ends = [profile.limit(side) if side in quantity.sides else None for side in (-1, 1)]
     if (turned := quantity.turned) is not None:
-        value, *ends = (turned(it) if it else None for it in (value, *ends[::-1]))
+        value, *ends = (turned(end) if end else None for end in (value, *ends[::-1]))
     low, high = (float(end) if end is not None and end > 0 else None for end in ends)
     if quantity.below is not None and max(value or 0.0, high or 0.0) > levels.OF_THE_FASTEST:
         value, high = None, None
@@ -270,7 +306,9 @@ def _find_limits(
     if low is not None and low < little:
         low = None
     value = None if low is None or high is None or value is None else float(value)
-    return Estimate(quantity.name, quantity.kind, quantity.at_s, quantity.unit, value, low, high)
+    return LinearLimits(
+        quantity.name, quantity.kind, quantity.at_s, quantity.unit, value, low, high
+    )
 
 
 class _Excess:
@@ -285,15 +323,17 @@ class _Excess:
         divisor = float(below @ fit.amplitudes) if quantity.below else 1.0
         self.best = float(above @ fit.amplitudes) / divisor if divisor else math.nan
         """The value of the best fit, NaN if it has none."""
-        row, own, faint = above - self.best * below, fit.amplitudes > 0, fit.lags.faint
+        row, taken, faint = above - self.best * below, fit.amplitudes > 0, fit.lags.faint
         clearly = float(np.abs(row[~faint]).max())
-        deviation = float(np.linalg.norm(np.linalg.lstsq(fit.lags.rows[own], row[own])[0]))
+        deviation = float(np.linalg.norm(np.linalg.lstsq(fit.lags.rows[taken], row[taken])[0]))
         deviation = deviation if deviation > _LEAST_DEVIATION * clearly else clearly
         stride = root(0) * deviation / (divisor or 1.0)
         # Of a liquid the modulus that another is divided by may vanish.
         self._stride = min(stride, levels.OF_THE_FASTEST) if quantity.below else stride
         self._deviation, self._divisor = deviation, divisor
-        self._open = [it for it in (-1, 1) if np.any(it * row[faint] > levels.HANGS * clearly)]
+        self._open = [
+            side for side in (-1, 1) if np.any(side * row[faint] > levels.HANGS * clearly)
+        ]
 
     def limit(self, side: int) -> float | None:
         """Find the limit on a side, -1 or 1, if there is one."""
@@ -301,51 +341,44 @@ class _Excess:
         nothing = side < 0 and self.best <= _NO_VALUE * self._stride
         if not 0 < self._stride < math.inf or side in self._open or nothing:
             return None
-        found, needed = self._closely(side, self.best + side * self._stride, self._root(0))
+        limit, needed = self._closely(side, self.best + side * self._stride, self._root(0))
         more = count_lags(self._fit.amplitudes > 0) - count_lags(needed)
-        if found is not None and more > 0:
-            found, _ = self._closely(side, found, self._root(more))
-        return found
+        if limit is not None and more > 0:
+            limit, _ = self._closely(side, limit, self._root(more))
+        return limit
 
     def _closely(self, side: int, value: float, root: float) -> tuple[float | None, BoolArray]:
         """Find a limit roughly, then with closer lags, beginning with a value; and its lags."""
         lags, accuracy = self._fit.lags, _ROUGH_ROOT
         for _ in range(_MOST_GRIDS):
-            found, needed = self._crossing(lags, side, value, root, accuracy)
-            if found is None or side * (found - self.best) < 0:
+            limit, needed = self._crossing(lags, side, value, root, accuracy)
+            if limit is None or side * (limit - self.best) < 0:
                 # Where the excess jumps, Newton's method may end on the other side.
                 return None, needed
             if accuracy < _ROUGH_ROOT and lags.are_close(needed):
                 break
-            lags, value, accuracy = lags.divided(needed), found, _ACCURATE_ROOT
-        return found, needed
+            lags, value, accuracy = lags.divided(needed), limit, _ACCURATE_ROOT
+        return limit, needed
 
     def _crossing(
         self, lags: Lags, side: int, value: float, root: float, accuracy: float
     ) -> tuple[float | None, BoolArray]:
-        """Return the limit with certain lags, and which it needs, beginning with a value."""
-        from scipy.optimize import nnls
+        """Return the limit with certain lags, and which it needs, beginning with a value.
 
-        above, below = self._quantity.added(lags)
-        seen: BoolArray = np.any(lags.rows, axis=1)
-        ratio = self._quantity.below is not None
-        rows = np.column_stack((lags.rows, above))
-        measured = np.append(self._fit.measured, 0.0)
+        Each value is held; Newton's step from there leads to the next, or, where that is not
+        between the values known to be inside and outside, half of the way.
+        """
+        held_fit = _HeldFits(self._fit, self._quantity, lags)
         inner, outer = self.best, math.inf
         for _ in range(_MOST_TRIALS):
             value = value if side > 0 else max(value, 0.0)
             # Rounding of a row that is far heavier than its value takes would outweigh the trace.
-            held = min(self._deviation, _SHARE_HELD * max(value, self.best) * self._divisor)
-            weight = _WEIGHT_HELD / held
-            rows[:, -1] = np.where(seen, weight * (above - value * below), 0.0)
-            measured[-1] = 0.0 if ratio else weight * value
-            amplitudes, norm = nnls(rows.T, measured, maxiter=100 * len(rows))
+            share = _SHARE_HELD * max(value, self.best) * self._divisor
+            amplitudes, norm, slope = held_fit.at(value, _WEIGHT_HELD / min(self._deviation, share))
             reached = math.sqrt(max(norm**2 - self._least, 0.0))
             over = reached - root
             if over < 0 and value <= 0:
                 break
-            force = weight * float(measured[-1] - amplitudes @ rows[:, -1])
-            slope = force * (float(below @ amplitudes) if ratio else 1.0)
             # Where the excess is flat, its slope says nothing.
             steep = side * slope > 0 and reached > _FLAT_SHARE * root
             step = -over * reached / slope if steep else side * math.inf
@@ -357,11 +390,42 @@ class _Excess:
             far = outer if math.isfinite(outer) else self.best + _TRIAL_GROWTH * (value - self.best)
             if far == inner:
                 break
-            share = (value + step - inner) / (far - inner)
-            if far == outer and not _JUMP_WIDTH < share < 1 - _JUMP_WIDTH:
-                share = 0.5
-            value = inner + min(share, 1.0) * (far - inner)
-        return None, seen
+            value = _next_trial(value + step, inner, far, halve=far == outer)
+        return None, held_fit.seen
+
+
+def _next_trial(aim: float, inner: float, far: float, *, halve: bool) -> float:
+    """Return the value aimed at if it is between an inner and a far one, or one between."""
+    share = (aim - inner) / (far - inner)
+    if halve and not _JUMP_WIDTH < share < 1 - _JUMP_WIDTH:
+        share = 0.5
+    return inner + min(share, 1.0) * (far - inner)
+
+
+class _HeldFits:
+    """Fits of non-negative amplitudes of lags with one more row, which holds a quantity."""
+
+    def __init__(self, fit: AnySampleFit, quantity: _Functional, lags: Lags) -> None:
+        self._above, self._below = quantity.added(lags)
+        self._is_ratio = quantity.below is not None
+        self.seen: BoolArray = np.any(lags.rows, axis=1)
+        self._rows = np.column_stack((lags.rows, self._above))
+        self._measured = np.append(fit.measured, 0.0)
+
+    def at(self, value: float, weight: float) -> tuple[Array, float, float]:
+        """Hold a value; return amplitudes, the norm left, and half the slope of its square."""
+        from scipy.optimize import nnls
+
+        row = weight * (self._above - value * self._below)
+        self._rows[:, -1] = np.where(self.seen, row, 0.0)
+        self._measured[-1] = 0.0 if self._is_ratio else weight * value
+        amplitudes, norm = nnls(self._rows.T, self._measured, maxiter=100 * len(self._rows))
+        force = weight * float(self._measured[-1] - amplitudes @ self._rows[:, -1])
+        return (
+            amplitudes,
+            norm,
+            force * (float(self._below @ amplitudes) if self._is_ratio else 1.0),
+        )
 
 
 def _quantities(residuals: Residuals, lags: Lags, times: Sequence[float]) -> Iterator[_Functional]:
@@ -371,10 +435,10 @@ def _quantities(residuals: Residuals, lags: Lags, times: Sequence[float]) -> Ite
     inside = [time_s for time_s in times if first_s <= time_s <= last_s]
     # Slopes and moduli at an end of the trace are hardly known.
     inner = [time_s for time_s in inside if _INNER * first_s <= time_s <= last_s / _INNER]
-    stiffness = instrument.stiffness
-    letter, (unit, *of_creep) = "K" if stiffness == "N/m" else "G", _UNITS_TOLD[stiffness]
+    unit, viscosity = instrument.stiffness, per_second_of(instrument.stiffness)
+    letter = "K" if "/" in unit else "G"
     if not (deforms or jaws):
-        letter, unit = "J", of_creep[0]
+        letter, unit = "J", inverse_of(unit)
     # What falls is not smaller before the first reading, and not larger after the last one.
     falls, level = (1, _ADDED["left"]) if deforms else (-1, _ADDED["yielded"])
     for at_s in times:
@@ -392,21 +456,23 @@ def _quantities(residuals: Residuals, lags: Lags, times: Sequence[float]) -> Ite
         for before_s, at_s in pairwise(inside):
             name = f"J({before_s:g} to {at_s:g} s)"
             yield _Functional(name, "increment", at_s, unit, partial(_rise, before_s))
-        _, per_s, viscosity = of_creep
+        per_s = inverse_of(viscosity)
         yield _Functional("slope at the end", "slope", last_s, per_s, _ADDED["per second"])
         flow = _ADDED["flowing"]
-        yield _Functional("viscosity", FLOW, None, viscosity, flow, None, (1,), lambda it: 1 / it)
+        yield _Functional(
+            "viscosity", FLOW, None, viscosity, flow, None, (1,), lambda flow: 1 / flow
+        )
     # Under a step of the deformation the fastest lag, of a damper, does not show.
     fastest = 1 / first_s if deforms and not lags.rows[-1].any() else math.inf
     stored, lost = _ADDED["slow" if deforms else "fast"], _ADDED["lost"]
     for at_s in reversed(inner):
-        for name, kind, its, above, below in (
+        for name, kind, unit_of_it, above, below in (
             (f"{letter}'", "storage", unit, stored, None),
             (f"{letter}''", LOSS, unit, lost, None),
             ("tan delta", "loss tangent", "", lost, stored),
         ):
             name = f"{name}({1 / at_s:.3g} rad/s)"
-            yield _Functional(name, kind, at_s, its, above, below, fastest=fastest)
+            yield _Functional(name, kind, at_s, unit_of_it, above, below, fastest=fastest)
 
 
 def _rise(before_s: float, time_s: float, rates: Array) -> Array:

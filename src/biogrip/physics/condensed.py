@@ -28,11 +28,13 @@ from numpy.polynomial import chebyshev, legendre
 
 from biogrip.arrays import Array
 from biogrip.physics.modes import Modes, mode_responses, responses_in_turn, sum_of_modes
-from biogrip.physics.noise import Whitening, without
+from biogrip.physics.noise import PairWhitening, Whitening, without
 from biogrip.physics.protocol import Course
 from biogrip.physics.rate_tables import ModeRows, SpanningModes
 
 _NODES_A_PIECE = 20
+# Square of a norm that may be rounding.
+_ROUNDING_OF_NORM = 1e-9
 _DEGREE_OF_PIECE = _NODES_A_PIECE - 1
 _NODES_OF_PIECE = chebyshev.chebpts1(_NODES_A_PIECE)
 # From values at the nodes to coefficients of Legendre polynomials, which are nearly orthogonal
@@ -90,12 +92,12 @@ class DenseSamples:
         rows: list[Array] = []
         rest = 0.0
         for piece in self._pieces:
-            own = samples[piece.readings]
+            of_piece = samples[piece.readings]
             if piece.basis is None:
-                rows.append(own)
+                rows.append(of_piece)
             else:
-                rows.append(own @ piece.basis)
-                rest += float(np.sum((own - piece.basis @ rows[-1]) ** 2))
+                rows.append(of_piece @ piece.basis)
+                rest += float(np.sum((of_piece - piece.basis @ rows[-1]) ** 2))
         return np.concatenate(rows), float(np.sqrt(rest))
 
     def _divided(self, first: int, stop: int) -> Iterator[_Piece]:
@@ -128,13 +130,22 @@ class Condensed:
     """Ascending sampling times, (n_samples,)."""
     functions: Array
     """Functions projected out, (n_functions, n_samples), but by whitening (`with_uncertain`)."""
-    whitening: Whitening | None = None
+    whitening: Whitening | PairWhitening | None = None
     """Transformation that whitens noise and projects nuisance out; None for white noise."""
 
     @property
     def nuisance(self) -> Array:
         """Functions that are projected out, (n_functions, n_samples)."""
         return self.functions if self.whitening is None else self.whitening.nuisance
+
+    @property
+    def taken(self) -> Array:
+        """Those of free amplitude, (n_taken, n_samples): what they reach is gone.
+
+        Others, of random amplitude, are shorter, and leave noise as large as elsewhere.
+        """
+        norms = np.sum(np.square(self.nuisance), axis=1)
+        return self.nuisance[norms > 1 - _ROUNDING_OF_NORM]
 
     def cleared(self, rows: Array) -> Array:
         """Project nuisance out of functions of time, (..., n_samples), and whiten noise."""
@@ -149,9 +160,9 @@ class Condensed:
             # The rest of it is what modes need.
             self.__dict__.setdefault("_factors", (np.empty(0), triangle[:, :-1]))
             return np.array(triangle[:, -1])
-        (orthonormal, _), (own, rest) = self._factors, self._dense.rows_of_samples(readings)
-        rows = own @ orthonormal
-        return np.append(rows, np.hypot(np.linalg.norm(own - orthonormal @ rows), rest))
+        (orthonormal, _), (projected, rest) = self._factors, self._dense.rows_of_samples(readings)
+        rows = projected @ orthonormal
+        return np.append(rows, np.hypot(np.linalg.norm(projected - orthonormal @ rows), rest))
 
     @cached_property
     def of_modes(self) -> ModeRows:
@@ -200,8 +211,8 @@ class Condensed:
         triangle = np.zeros((len(self.functions) + len(scale) + 1,) * 2)
         before = slice(int(self.all_s.searchsorted(self.course.time_s[0], side="right")))
         later = responses_in_turn(rates, self.course, self.all_s, slopes=False)
-        for here, found in chain([(before, np.zeros((1, 1, len(scale), before.stop)))], later):
-            more = np.vstack((self.functions[:, here], scale * found[0, 0], readings[here])).T
+        for here, responses in chain([(before, np.zeros((1, 1, len(scale), before.stop)))], later):
+            more = np.vstack((self.functions[:, here], scale * responses[0, 0], readings[here])).T
             triangle = np.asarray(np.linalg.qr(np.concatenate((triangle, more)), mode="r"))
             triangle *= np.where(np.diagonal(triangle) < 0, -1.0, 1.0)[:, None]
         return triangle

@@ -131,10 +131,10 @@ def in_series(first: Ladder, second: Ladder) -> Network:
     rates = zeros.values
     if np.all(product := first.springs * second.springs):
         springs = np.where(springs == 0, _SPRING_OF_EQUAL_LADDERS, springs)
-        shared, own = product / both.springs, springs[1:]
+        shared, at_zeros = product / both.springs, springs[1:]
         # Rates that are nearly equal cost digits: apart, with the same mean, they do not.
         lack = np.maximum(_LEAST_GAP_OF_LADDERS * poles[1:] - (rates[1:] - poles[1:]).real, 0)
-        share = shared / (shared + own)
+        share = shared / (shared + at_zeros)
         rates[1:] += lack * share
         rates = np.concatenate((rates, poles[1:] - lack * (1 - share)))
         springs = np.concatenate((springs, shared))
@@ -197,8 +197,8 @@ def on_clock(model: SampleModel, unit_s: float) -> SampleModel:
             if kind in ("springpot", "damping"):
                 power = columns[place + 1] if kind == "springpot" else 1.0
                 columns[place] = columns[place] / unit_s**power
-        found = model.network(columns.T)
-        return replace(found, c_p=found.c_p * unit_s, c=found.c * unit_s)
+        in_units = model.network(columns.T)
+        return replace(in_units, c_p=in_units.c_p * unit_s, c=in_units.c * unit_s)
 
     return replace(model, network=network)
 

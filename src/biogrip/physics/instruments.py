@@ -9,7 +9,7 @@ by sines, one frequency after the other, and reads two moduli: rheometers, micro
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 
@@ -25,8 +25,10 @@ class Channel:
     """Units of a file's column, as multiples of the SI unit."""
     label: str = ""
     """Name on axes, where it says more."""
+    usual: str = ""
+    """Usual name of a column whose numbers have another unit."""
     power: float = field(default=1.0, compare=False)
-    """Exponent of a number in such a unit, as 1.5 of the indentation by a sphere."""
+    """Exponent of a number in such a unit, as 1.5 of the depth of a sphere."""
 
     def in_si(self, sizes: Any, unit: str, scale: float = 1.0) -> Any:
         """Return numbers in one of the units, times a scale, in the SI unit."""
@@ -54,7 +56,7 @@ class Channel:
     @property
     def column(self) -> str:
         """Usual name of a column or key: the name with the unit."""
-        return self.name + self.suffix
+        return self.usual or self.name + self.suffix
 
 
 def _raised(sizes: Any, power: float) -> Any:
@@ -75,11 +77,19 @@ class Instrument:
     read: Channel
     """What a trace is of."""
     stiffness: str = "N/m"
-    """Unit of a sample's stiffnesses: Pa if they are moduli, none if these are shares."""
+    """Unit of a sample's stiffnesses: Pa if they are moduli, none if these are shares; those of
+    its dampings and compliances follow."""
     relative: bool = False
     """True if what is read is divided by the largest controlled value."""
     partners: tuple[Channel, ...] = ()
     """What may be read beside it at each frequency of a sweep, so that both tell both moduli."""
+    sentence: str = "In {kind} the {read} was recorded"
+    """What a paper says of it."""
+
+    @property
+    def in_words(self) -> str:
+        """What a paper says of it, up to what was controlled."""
+        return self.sentence.format(kind=self.kind, read=self.read.name.replace("_", " "))
 
     @property
     def deforms(self) -> bool:
@@ -106,7 +116,10 @@ ROTATION = Channel(
     {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": math.pi / 180},
     "closing rotation",
 )
-GRIPPER = Instrument("gripper", TORQUE, ROTATION)
+GRIPPER = Instrument(
+    *("gripper", TORQUE, ROTATION),
+    sentence="The {read} of an arm of a microgripper was recorded",
+)
 """Its read rotation is the closing one of its left arm."""
 
 STRESS_UNITS = {
@@ -136,7 +149,14 @@ LOSS_FACTOR = Channel("loss_factor", "", {"1": 1.0, "%": 1e-2})
 _LOSSES = Channel("loss", "Pa", STRESS_UNITS), PHASE, LOSS_FACTOR
 _STIFF_LOSSES = Channel("loss", "N/m", _STIFFNESSES), PHASE, LOSS_FACTOR
 _MODULI = [Channel(name, "Pa", STRESS_UNITS) for name in ("storage", "complex_modulus")]
+VISCOSITY = Channel(
+    *("complex_viscosity", "Pa", {"Pa s": 1.0, "mPa s": 1e-3, "P": 0.1, "cP": 1e-3}),
+    usual="complex_viscosity_Pas",
+)
+"""It is times the angular frequency a modulus, which is what a trace has of it."""
 _STIFF = Channel("storage_stiffness", "N/m", _STIFFNESSES)
+
+_READ_BOTH = "In oscillation storage and loss moduli were recorded over frequency"
 
 INSTRUMENTS: dict[str, Instrument] = {
     instrument.read.name: instrument
@@ -149,8 +169,11 @@ INSTRUMENTS: dict[str, Instrument] = {
         Instrument("relaxation", STRAIN, STRESS, stiffness="Pa"),
         Instrument("relaxation", STRAIN, MODULUS, stiffness="Pa", relative=True),
         Instrument("relaxation", STRAIN, RELATIVE_MODULUS, stiffness="", relative=True),
-        *(Instrument("oscillation", STRAIN, each, "Pa", True, _LOSSES) for each in _MODULI),
-        Instrument("oscillation", DISPLACEMENT, _STIFF, "N/m", True, _STIFF_LOSSES),
+        *(
+            Instrument("oscillation", STRAIN, of, "Pa", True, _LOSSES, _READ_BOTH)
+            for of in (*_MODULI, VISCOSITY)
+        ),
+        Instrument("oscillation", DISPLACEMENT, _STIFF, "N/m", True, _STIFF_LOSSES, _READ_BOTH),
     )
 }
 """Instruments by the name of the quantity that they read."""
@@ -165,21 +188,13 @@ CONTROLLED = tuple(dict.fromkeys(instrument.controlled for instrument in INSTRUM
 """Quantities that protocols set."""
 
 
-def under_sphere(instrument: Instrument, radius_m: float) -> Instrument:
-    """Return an instrument of stress and strain that has the force and indentation of a sphere.
+def in_contact(loads: Any, power: float, deeper: float) -> Any:
+    """Return powers of depths that are deeper by some unit, from powers of depths with their sign.
 
-    On a half-space, incompressible and with Young's modulus E, a sphere of radius R that is
-    indented by d has the force F = 16/9 E sqrt(R) d^1.5 (Hertz). So 9 F/(16 R^2) is a stress under
-    the strain (d/R)^1.5, of a viscoelastic sample, too, while the contact does not shrink (Lee and
-    Radok, J. Appl. Mech. 27 (1960), 438-444). A `KeyError` has a quantity that is neither.
+    Before its contact a tip neither presses nor indents.
     """
-    forces = {unit: 9 * size / (16 * radius_m**2) for unit, size in FORCE.units.items()}
-    depths = {unit: size / radius_m for unit, size in DISPLACEMENT.units.items()}
-    of = {
-        STRESS: replace(STRESS, units=forces, label="force"),
-        STRAIN: replace(STRAIN, units=depths, label="indentation", power=1.5),
-    }
-    return replace(instrument, controlled=of[instrument.controlled], read=of[instrument.read])
+    depths = _raised(loads, 1 / power) + deeper
+    return _raised(0.5 * (depths + abs(depths)), power)
 
 
 def of_kind(kind: str) -> list[Instrument]:

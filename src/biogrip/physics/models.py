@@ -12,6 +12,7 @@ model's parameters are turned into those of the richer one. Each model says whic
 directly; those in these are in it as well. The paper's results to compare with are here, too.
 """
 
+import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
@@ -20,6 +21,7 @@ from math import inf
 import numpy as np
 
 from biogrip.arrays import Array
+from biogrip.errors import BiogripError, nearest_three
 from biogrip.physics.fractional import FRACTIONAL_MODELS
 from biogrip.physics.sample_model import (
     C_P,
@@ -236,7 +238,10 @@ ALIASES = {
     **dict.fromkeys(("sls", "standard_linear_solid", "zener"), "zener_maxwell"),
     **{"kv": "kelvin_voigt", "dashpot": "damper", "power_law": "springpot", "drop": "liquid_drop"},
 }
-"""Usual names of models; ``prony3`` is `generalized_maxwell_3` without c_p."""
+"""Usual names of models; ``prony3`` or ``sls3`` is `generalized_maxwell_3` without c_p."""
+
+
+_WITH_BRANCHES = re.compile(rf"{GENERALIZED_MAXWELL.name}_([1-{MOST_BRANCHES}])")
 
 
 @dataclass(frozen=True)
@@ -249,6 +254,17 @@ class Sample:
     """Number of Maxwell branches of a generalized one."""
     stiffness: str = "N/m"
     """Unit of its stiffnesses: N/m, Pa, or none if they are shares of another."""
+
+    def __post_init__(self) -> None:
+        """Take a usual name, as sls, or one with the number of branches; refuse an unknown one."""
+        name = ALIASES.get(self.name.lower(), self.name)
+        if branches := _WITH_BRANCHES.fullmatch(name):
+            name = GENERALIZED_MAXWELL.name
+            object.__setattr__(self, "branches", int(branches[1]))
+        if name not in MODELS:
+            near = nearest_three(name, [*MODELS, *ALIASES])
+            raise BiogripError(f"found the sample model '{name}'. Did you mean {near}?")
+        object.__setattr__(self, "name", name)
 
     @property
     def model(self) -> SampleModel:
@@ -279,24 +295,24 @@ CANDIDATES: dict[str, Sample] = {
 @cache
 def contained(candidate: str) -> Mapping[str, tuple[Turned, ...]]:
     """Return the candidates nested in one, each with the fewest conversions of its parameters."""
-    found: dict[str, tuple[Turned, ...]] = {candidate: ()}
+    nested: dict[str, tuple[Turned, ...]] = {candidate: ()}
     ahead = [candidate]
     for richer in ahead:
         for name, turned in CANDIDATES[richer].model.contains.items():
-            if name not in found:
-                found[name] = (turned, *found[richer])
+            if name not in nested:
+                nested[name] = (turned, *nested[richer])
                 ahead.append(name)
-    del found[candidate]
-    return found
+    del nested[candidate]
+    return nested
 
 
 def different_in(candidate: str, others: Collection[str]) -> list[str]:
     """Return those of `others` that are nested in one, and one of models that are equivalent."""
-    found: list[str] = []
+    different: list[str] = []
     for name in filter(others.__contains__, contained(candidate)):
-        if not any(name in contained(other) and other in contained(name) for other in found):
-            found.append(name)
-    return found
+        if not any(name in contained(other) and other in contained(name) for other in different):
+            different.append(name)
+    return different
 
 
 def as_richer(candidate: str, simpler: str, parameters: Array) -> Array:

@@ -225,8 +225,8 @@ def mode_responses(rates: Array, course: Course, time_s: Array) -> Array:
     (n, n_modes, n_times), in units of what is controlled.
     """
     responses = np.zeros((*rates.shape, len(time_s)))
-    for here, (found,) in responses_in_turn(rates, course, time_s, slopes=False):
-        responses[..., here] = found
+    for here, (at_times,) in responses_in_turn(rates, course, time_s, slopes=False):
+        responses[..., here] = at_times
     return responses
 
 
@@ -257,15 +257,18 @@ def responses_in_turn(
         first, counts = firsts[phases.start], np.diff(firsts[phases.start :])[: len(lasts)]
         phase = np.repeat(np.arange(len(lasts)), counts)
         for some in parts(len(phase), at_once):
-            here, own = slice(first + some.start, first + min(some.stop, len(phase))), phase[some]
-            elapsed = time_s[here] - course.time_s[phases][own]
-            if np.array_equal(elapsed, lasts[own]):
+            here, in_phase = (
+                slice(first + some.start, first + min(some.stop, len(phase))),
+                phase[some],
+            )
+            elapsed = time_s[here] - course.time_s[phases][in_phase]
+            if np.array_equal(elapsed, lasts[in_phase]):
                 # Rows of a record are read at the ends of its phases.
-                found = states[..., own + 1]
-                found[0] -= after[own]
-                yield here, found
+                at_ends = states[..., in_phase + 1]
+                at_ends[0] -= after[in_phase]
+                yield here, at_ends
             else:
-                yield here, go_on.after(states, own, elapsed)
+                yield here, go_on.after(states, in_phase, elapsed)
 
 
 def moduli_of_modes(rates: Array, places: Array) -> Array:
@@ -276,9 +279,9 @@ def moduli_of_modes(rates: Array, places: Array) -> Array:
     """
     omega, stores, forgets = np.abs(places), places > 0, -rates[..., None]
     size = omega**2 + forgets**2
-    found = np.where(stores, omega**2, omega * forgets) / size
+    moduli = np.where(stores, omega**2, omega * forgets) / size
     of_loss = omega * (forgets**2 - omega**2)
-    return np.stack((found, np.where(stores, 2 * forgets * omega**2, of_loss) / size**2))
+    return np.stack((moduli, np.where(stores, 2 * forgets * omega**2, of_loss) / size**2))
 
 
 class _Motion:
@@ -299,12 +302,12 @@ class _Motion:
 
     def after(self, states: Array, phase: IntArray, elapsed_s: Array) -> Array:
         """Return modes at times since the starts of phases, (..., n_times)."""
-        remains, found = self._terms(phase, elapsed_s)
+        remains, moved = self._terms(phase, elapsed_s)
         reached = states[..., phase]
-        found[0] += reached[0] * remains
+        moved[0] += reached[0] * remains
         if self._slopes:
-            found[1] += (reached[1] + reached[0] * elapsed_s) * remains
-        return found
+            moved[1] += (reached[1] + reached[0] * elapsed_s) * remains
+        return moved
 
     def _terms(self, phase: IntArray, elapsed_s: Array) -> tuple[Array, Array]:
         """Return what remains of modes after times in phases, and what they gain in these."""
@@ -356,7 +359,7 @@ def respond(
     """
     z, most = rate * elapsed_s, max(orders, default=0)
     phis = phi_functions(most + 1, z) if most else []
-    found = []
+    responses = []
     for order in orders:
         power = elapsed_s**order
         if order == 0:
@@ -368,5 +371,5 @@ def respond(
             power = power * elapsed_s
             slope = power * (phis[order] - order * phis[order + 1])
             both = rate * power * phis[order + 1], slope
-        found.append(np.stack(both[: 1 + slopes]))
-    return found
+        responses.append(np.stack(both[: 1 + slopes]))
+    return responses

@@ -396,3 +396,43 @@ class Whitening:
             self._time_s, self._rates, self._left, self._right, columns, np.empty_like(columns)
         )
         return (solved / self._deviations[:, None]).T.reshape(rows.shape)
+
+
+def moduli_of(rows: Array, places: Array) -> Array:
+    """Return moduli, (..., n_moduli, n_frequencies), of rows of a sweep, (..., n_samples).
+
+    Frequencies ascend; of both moduli the storage modulus is the first.
+    """
+    lost = np.count_nonzero(places < 0)
+    parts = rows[..., lost:], rows[..., lost - 1 :: -1] if lost else rows[..., :0]
+    return np.stack([part for part in parts if part.shape[-1]], axis=-2)
+
+
+def places_of(moduli: Array, places: Array) -> Array:
+    """Return rows of a sweep, (..., n_samples), of moduli: the inverse of `moduli_of`."""
+    stored, lost = moduli[..., 0, :], moduli[..., -1, ::-1]
+    parts = [lost] * bool(places[0] < 0) + [stored] * bool(places[-1] > 0)
+    return np.concatenate(parts, axis=-1)
+
+
+class PairWhitening:
+    """Turns noise of both moduli of a sweep, correlated at each frequency, into white noise.
+
+    It is C^(-1/2) of the covariance C of each pair, which keeps the moduli apart as far as it can.
+    Places and standard deviations are (n_samples,), the correlation is (n_frequencies,).
+    """
+
+    def __init__(self, places: Array, sd: Array, correlation: Array) -> None:
+        self._places, (first, second) = places, moduli_of(sd, places)
+        shared = correlation * first * second
+        root = first * second * np.sqrt(1 - correlation**2)
+        size = np.sqrt(np.mean(sd**2)) / (root * np.sqrt(first**2 + second**2 + 2 * root))
+        # (C + sqrt(det C)) / sqrt(tr C + 2 sqrt(det C)) is the root of C, and this its inverse.
+        self._parts = size * np.array([[second**2 + root, -shared], [-shared, first**2 + root]])
+        self.nuisance = np.zeros((0, len(sd)))
+        """None."""
+
+    def __call__(self, rows: Array) -> Array:
+        """Whiten rows of a sweep, (..., n_samples); the variance stays the same on average."""
+        moduli = moduli_of(rows, self._places)
+        return places_of(np.einsum("ijn,...jn->...in", self._parts, moduli), self._places)

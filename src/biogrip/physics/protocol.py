@@ -75,6 +75,8 @@ class Course:
     """End of the protocol."""
     deforms: bool = False
     """True if a deformation is controlled, and the load is read: relaxation."""
+    smoothed: bool = False
+    """True if noise was smoothed out of a record, of which something may be left."""
     sweeps: ClassVar[bool] = False
     """True if it is a `Sweep`, whose readings do not follow one another in time."""
 
@@ -124,6 +126,20 @@ class Course:
         """Return the protocol with all that is controlled multiplied by a factor."""
         scaled = factor * self.changes, factor * self.within_phases
         return replace(self, changes=scaled[0], within_phases=scaled[1])
+
+    def risen(self, within_s: float) -> "Course":
+        """Return the protocol with all steps reached linearly within some s, from when they came.
+
+        What comes after a step is superposed, as in linear responses.
+        """
+        at, heights = self.time_s, self.changes[:, 0]
+        rates = np.zeros((2 * np.count_nonzero(heights), max(2, self.changes.shape[1])))
+        rates[:, 1] = np.concatenate((heights[heights != 0], -heights[heights != 0])) / within_s
+        rest = np.pad(self.changes, ((0, 0), (0, rates.shape[1] - self.changes.shape[1])))
+        rest[:, 0] = 0.0
+        starts = np.concatenate((at, at[heights != 0], at[heights != 0] + within_s))
+        end_s = max(self.end_s, float(starts.max()))
+        return superposed(starts, np.vstack((rest, rates)), end_s, deforms=self.deforms)
 
     def snapped(self, time_s: Array) -> Array:
         """Return ascending times, (n_times,), with those that are changes but for rounding on them.
@@ -201,16 +217,26 @@ def join_phases(phases: tuple[Phase, ...], *, deforms: bool = False) -> Course:
     # A ramp that ends where the next one begins makes no step, but for rounding, and one that goes
     # on at the same rate no jump of the rate.
     changes[1:][np.abs(changes[1:]) < least] = 0.0
-    within = changes.copy()
-    for k, gap in enumerate(np.diff(starts)):
+    return superposed(starts, changes, float(ends[-1]), deforms=deforms)
+
+
+def superposed(starts_s: Array, changes: Array, end_s: float, *, deforms: bool) -> Course:
+    """Return the protocol of changes of all orders, (n, n_orders), at times in any order, (n,)."""
+    time_s, place = np.unique(starts_s, return_inverse=True)
+    summed = np.zeros((len(time_s), changes.shape[1]))
+    np.add.at(summed, place, changes)
+    within = summed.copy()
+    for k, gap in enumerate(np.diff(time_s)):
         within[k + 1] += _carried(within[k], gap)
-    return Course(starts, changes, within, float(ends[-1]), deforms)
+    return Course(time_s, summed, within, end_s, deforms)
 
 
-def _carried(orders: Array, t: Array) -> tuple[Array, Array, Array]:
-    """Return level, slope and curvature after a time."""
-    level, slope, curvature = orders
-    return level + slope * t + curvature * t**2 / 2, slope + curvature * t, curvature
+def _carried(orders: Array, t: Array | float) -> list[Array]:
+    """Return level, slope, curvature and so on after a time."""
+    return [
+        sum((own * t**n / factorial(n) for n, own in enumerate(orders[order:])), np.zeros(()))
+        for order in range(len(orders))
+    ]
 
 
 def evaluate(course: Course, time_s: ArrayLike) -> Array:
@@ -233,6 +259,12 @@ def largest_load(phases: Iterable[Phase]) -> float:
     return max(ends, key=abs)
 
 
+def spacing_at(time_s: Array, at_s: float) -> float:
+    """Return how far ascending times, (n,), are apart at one of them, or nearest to it, in s."""
+    after = int(np.clip(np.searchsorted(time_s, at_s), 1, len(time_s) - 1))
+    return float(time_s[after] - time_s[after - 1])
+
+
 def sample_times(duration_s: float, rate_Hz: float) -> Array:
     """Return uniform sampling times in s from 0, including the end if it falls on one."""
     count = int(np.floor(duration_s * rate_Hz * (1 + 1e-12))) + 1
@@ -248,16 +280,17 @@ _SMOOTH, _STRAIGHT = 0.25, 0.1
 _ABRUPT, _STEP_OF_EXTENT = 8.0, 0.01
 
 
-def with_steps(record: Array) -> tuple[Array, Array]:
+def with_steps(record: Array, least: float = 0.0) -> tuple[Array, Array]:
     """Return a record, (n, 2), with a step in the middle of each two rows between which one came.
 
-    A step is two rows of one time. Also returned are standard deviations of their times in s,
-    (n_steps,), which are anywhere between the rows.
+    A step is two rows of one time, and not smaller than the least. Also returned are standard
+    deviations of their times in s, (n_steps,), which are anywhere between the rows.
     """
     time_s, values = record.T
     sizes = np.pad(np.abs(np.diff(values)), _ASIDE)
     around = [np.roll(sizes, by) for by in (-2, -1, 1, 2)]
-    abrupt = sizes > np.maximum(_ABRUPT * np.max(around, axis=0), _STEP_OF_EXTENT * np.ptp(values))
+    least = max(least, _STEP_OF_EXTENT * float(np.ptp(values)))
+    abrupt = sizes > np.maximum(_ABRUPT * np.max(around, axis=0), least)
     before = np.flatnonzero(abrupt[_ASIDE:-_ASIDE])
     middle_s = 0.5 * (time_s[before] + time_s[before + 1])
     steps = np.stack((np.repeat(middle_s, 2), np.ravel(values[before[:, None] + [0, 1]])), axis=1)

@@ -18,18 +18,19 @@ References
 """
 
 from collections.abc import Callable
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.polynomial import Chebyshev, Polynomial, chebyshev
 from numpy.typing import NDArray
 
-from biogrip.arrays import Array, IntArray
+from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.physics.modes import Modes, respond
 
 # Width and degree of wide pieces, and number of short pieces in one for sums and for rows.
 _PIECE_WIDTH, _WIDE_DEGREE = 0.25, 11
 _SHORTER, _SHORTER_OF_ROWS = 32, 16
+_ROWS_WIDTH = _PIECE_WIDTH / _SHORTER_OF_ROWS
 _ORDERS = np.arange(6)
 # exp(-40) is lost in rounding: beyond, only what has not begun to decay is left.
 _DECAYED = 40.0
@@ -56,7 +57,7 @@ _CHEBYSHEV_POWERS = (
     Chebyshev.basis(n, domain=(0, 1)).convert(kind=Polynomial).coef for n in _ORDERS
 )
 _TO_POWERS: Array = np.array(
-    [np.pad(each, (0, len(_ORDERS) - len(each))) for each in _CHEBYSHEV_POWERS]
+    [np.pad(powers, (0, len(_ORDERS) - len(powers))) for powers in _CHEBYSHEV_POWERS]
 )
 
 
@@ -120,40 +121,61 @@ class ModeRows:
         self._last = len(self._table) - 1
 
     def __call__(self, modes: Modes) -> Array:
-        """Return rows of responses with derivatives, (n, 1 + n_parameters, n_rows)."""
+        """Return rows of responses with derivatives, (n, 1 + n_parameters, n_rows).
+
+        1. The place of each rate: a piece of the table, and powers of the place within it.
+        2. Amplitudes: weights times what rows are tabulated over.
+        3. Amplitudes times powers, and their derivatives by the log-parameters.
+        4. One product of these with the coefficients of the pieces.
+        """
         count, parameters, n_modes = modes.rate_slopes.shape
-        end_s, deforms, decayed = self._modes.end_s, self._modes.deforms, self._modes.decayed
-        scaled, width = -end_s * modes.rates, _PIECE_WIDTH / _SHORTER_OF_ROWS
-        u = np.log1p(scaled) / width
+        scaled = -self._modes.end_s * modes.rates
+        u = np.log1p(scaled) / _ROWS_WIDTH
         lasts = u < self._last
         piece = np.where(lasts, u, self._last).astype(np.intp)
-        beyond = decayed / np.maximum(scaled, decayed)
+        beyond = self._modes.decayed / np.maximum(scaled, self._modes.decayed)
         powers = _powers(np.where(lasts, u - piece, beyond))
-        scale = _divisor(scaled, decayed, deforms)
-        amplitudes = modes.weights * scale
+        scale = _divisor(scaled, self._modes.decayed, self._modes.deforms)
         mixed = np.empty((count, 1 + parameters, n_modes, len(_ORDERS)))
-        np.multiply(amplitudes[..., None], powers, out=mixed[:, 0])
+        np.multiply((modes.weights * scale)[..., None], powers, out=mixed[:, 0])
         if parameters:
-            # The divisor, and the place, with their derivatives by the log-parameters.
-            scaled_slopes = -end_s * modes.rate_slopes
-            place_slopes = np.where(
-                lasts, 1 / (width * (1 + scaled)), -beyond / np.maximum(scaled, decayed)
+            by_rate = np.where(
+                lasts,
+                1 / (_ROWS_WIDTH * (1 + scaled)),
+                -beyond / np.maximum(scaled, self._modes.decayed),
             )
-            place_slopes = place_slopes[:, None] * scaled_slopes
-            scale_slopes = np.where(lasts, 1.0, 0.0)[:, None] * scaled_slopes
-            if deforms:
-                # What a fast mode has not forgotten falls with its rate.
-                scale_slopes = -(scale * scale)[:, None] * scaled_slopes
-            amplitude_slopes = modes.weight_slopes * scale[:, None]
-            amplitude_slopes += modes.weights[:, None] * scale_slopes
-            moved = amplitudes[:, None] * place_slopes
-            np.multiply(amplitude_slopes[..., None], powers[:, None], out=mixed[:, 1:])
-            # The power of order 0 stays.
-            power_slopes = _ORDERS[1:] * powers[..., :-1]
-            mixed[:, 1:, :, 1:] += moved[..., None] * power_slopes[:, None]
+            self._mix_slopes(modes, scale, lasts, by_rate, powers, mixed[:, 1:])
         # One product per sample: the order of its sums does not depend on the number of samples.
         pieces = self._table[piece].reshape(count, -1, self._table.shape[2])
         return mixed.reshape(count, 1 + parameters, -1) @ pieces
+
+    def _mix_slopes(
+        self,
+        modes: Modes,
+        scale: Array,
+        lasts: BoolArray,
+        by_rate: Array,
+        powers: Array,
+        out: Array,
+    ) -> None:
+        """Put derivatives of amplitudes times powers in `out`, (n, n_parameters, n_modes, 6).
+
+        Given are amplitudes over weights, whether places are in a piece rather than in the last,
+        the derivatives of places by -T r, (n, n_modes), and powers, (n, n_modes, degree + 1).
+        """
+        scaled_slopes = -self._modes.end_s * modes.rate_slopes
+        place_slopes = by_rate[:, None] * scaled_slopes
+        scale_slopes = np.where(lasts, 1.0, 0.0)[:, None] * scaled_slopes
+        if self._modes.deforms:
+            # What a fast mode has not forgotten falls with its rate.
+            scale_slopes = -(scale * scale)[:, None] * scaled_slopes
+        amplitude_slopes = modes.weight_slopes * scale[:, None]
+        amplitude_slopes += modes.weights[:, None] * scale_slopes
+        moved = (modes.weights * scale)[:, None] * place_slopes
+        np.multiply(amplitude_slopes[..., None], powers[:, None], out=out)
+        # The power of order 0 stays.
+        power_slopes = _ORDERS[1:] * powers[..., :-1]
+        out[..., 1:] += moved[..., None] * power_slopes[:, None]
 
 
 class SpanningModes:
@@ -177,36 +199,42 @@ class SpanningModes:
 
 @lru_cache(maxsize=16)
 def _spanning(halvings: int, orders: int, deforms: bool) -> tuple[Array, float, Array]:
-    """Return rates over T, one beyond which nothing lasts, and the table of `ModeRows`."""
+    """Return rates over T, one beyond which nothing lasts, and the table of `ModeRows`.
+
+    1. Responses of modes of many rates, to jumps of all orders, after all times.
+    2. Those of which the others are sums: their rates.
+    3. In wide pieces of rates, and beyond, shares of these in a mode of any rate: the table.
+    """
     elapsed = np.exp(-np.arange(0.0, halvings * np.log(2) + _SPACING_OF_TIMES, _SPACING_OF_TIMES))
-
-    def jumps(rates: Array) -> Array:
-        """Return scaled responses to jumps of all orders after all times, (n_jumps, n)."""
-        every = respond(range(orders), rates, elapsed[:, None], deforms=deforms)
-        return np.concatenate([found[0] for found in every]) * _scale_of_modes(rates, deforms)
-
+    jumps = partial(_scaled_jumps, elapsed[:, None], orders, deforms)
     wide = int(np.ceil(np.log1p(_DECAYED * 2.0**halvings) / _PIECE_WIDTH))
     decayed = float(np.expm1(_PIECE_WIDTH * wide))
     last = np.log1p(decayed / _SHORT_NODES[0])
     candidates = -np.expm1(np.arange(_SPACING_OF_RATES, last, _SPACING_OF_RATES))
-    found = jumps(candidates)
-    sizes = np.max(np.abs(found), axis=1, keepdims=True)
-    columns = found / sizes
+    responses = jumps(candidates)
+    sizes = np.max(np.abs(responses), axis=1, keepdims=True)
+    columns = responses / sizes
     chosen = _independent(columns)
     basis, triangle = np.linalg.qr(columns[:, chosen])
-    rates, basis = candidates[chosen], basis / sizes
+    basis /= sizes
 
-    def values(scaled: Array) -> Array:
-        """Return shares of modes in tabulated rows, by -T r, (n_modes, n)."""
-        shares = np.linalg.solve(triangle, basis.T @ jumps(-scaled))
-        return shares / (_scale_of_modes(-scaled, deforms) * _divisor(scaled, decayed, deforms))
+    def shares(scaled: Array) -> Array:
+        """Return shares of the chosen modes in tabulated rows, by -T r, (n_modes, n)."""
+        of_modes = np.linalg.solve(triangle, basis.T @ jumps(-scaled))
+        return of_modes / (_scale_of_modes(-scaled, deforms) * _divisor(scaled, decayed, deforms))
 
     pieces = [
-        _in_short_pieces(values(np.expm1(_PIECE_WIDTH * (piece + _WIDE_NODES))), _SHORTER_OF_ROWS)
+        _in_short_pieces(shares(np.expm1(_PIECE_WIDTH * (piece + _WIDE_NODES))), _SHORTER_OF_ROWS)
         for piece in range(wide)
     ]
-    beyond = values(decayed / _SHORT_NODES) @ _TO_CHEBYSHEV @ _TO_POWERS
-    return rates, decayed, np.concatenate([*pieces, beyond[:, None]], axis=1)
+    beyond = shares(decayed / _SHORT_NODES) @ _TO_CHEBYSHEV @ _TO_POWERS
+    return candidates[chosen], decayed, np.concatenate([*pieces, beyond[:, None]], axis=1)
+
+
+def _scaled_jumps(elapsed: Array, orders: int, deforms: bool, rates: Array) -> Array:
+    """Return scaled responses to jumps of all orders after all times, (n_jumps, n_rates)."""
+    responses = respond(range(orders), rates, elapsed, deforms=deforms)
+    return np.concatenate([of_order[0] for of_order in responses]) * _scale_of_modes(rates, deforms)
 
 
 def _independent(columns: Array) -> list[int]:

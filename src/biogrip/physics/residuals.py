@@ -95,9 +95,7 @@ class Residuals:
     @property
     def free(self) -> int:
         """Number of readings minus that of nuisance functions of free amplitude."""
-        norms = np.sum(np.square(self.trace.condensed.nuisance), axis=1)
-        # Those of random amplitude are shorter: they are projected out in part.
-        return self.samples - int(np.count_nonzero(norms > 1 - 1e-9))
+        return self.samples - len(self.trace.condensed.taken)
 
     @property
     def duration_s(self) -> float:
@@ -129,6 +127,12 @@ class Residuals:
         trace, earlier_s = self.trace, self.course.snapped(self.trace.time_s - change_s)
         condensed = replace(trace.condensed, all_s=earlier_s)
         return replace(self, trace=replace(trace, condensed=condensed, known_scatter=trace.scatter))
+
+    def under(self, course: Course) -> "Residuals":
+        """Return the residuals of a trace under another protocol; noise and nuisance stay."""
+        condensed = replace(self.trace.condensed, course=course)
+        trace = replace(self.trace, condensed=condensed, known_scatter=self.trace.scatter)
+        return replace(self, course=course, trace=trace)
 
     @property
     def of_responses(self) -> Hashable:

@@ -164,14 +164,14 @@ def phi_functions(most: int, z: NDArray[Any]) -> list[NDArray[Any]]:
     for k in range(18, -1, -1):
         series = series * near + 1 / factorial(k + most)
     value = np.expm1(far) / far
-    found = [np.exp(z), value]
+    phis = [np.exp(z), value]
     for n in range(1, most):
         value = (value - 1 / factorial(n)) / far
-        found.append(value)
+        phis.append(value)
     for n in range(most, 0, -1):
-        found[n] = np.where(small, series, found[n])
+        phis[n] = np.where(small, series, phis[n])
         series = series * near + 1 / factorial(n - 1)
-    return found
+    return phis
 
 
 @dataclass(frozen=True)
@@ -354,19 +354,19 @@ class Ringing:
         """Return the polynomial, E times all s + r_j, divided by its derivative."""
         s = beyond - origin
         away = (self._rates - origin[..., None]) + beyond[..., None]
-        own = self._rates == origin[..., None]
-        inverse = np.where(own, 0, 1 / away)
+        at_origin = self._rates == origin[..., None]
+        inverse = np.where(at_origin, 0, 1 / away)
         arms, arms_slope, factor, factor_slope = self._of_arms(s)
         others = self._b_2 * (self._k_p + self._c_p * s + (self._k * inverse).sum(axis=2) * s)
         others_slope = self._b_2 * (self._c_p + (self._k * self._rates * inverse**2).sum(axis=2))
         value = arms + factor * others
         slope = arms_slope + factor_slope * others + factor * others_slope
         # At the origin of a branch: value and slope times s + r.
-        spring = self._b_2 * np.where(own, self._k, 0).sum(axis=2)
-        has_own = np.any(own, axis=2)
+        spring = self._b_2 * np.where(at_origin, self._k, 0).sum(axis=2)
+        is_at_origin = np.any(at_origin, axis=2)
         whole = value + beyond * slope + spring * (factor_slope * s + factor)
-        slope = np.where(has_own, whole, slope)
-        value = np.where(has_own, beyond * value + spring * factor * s, value)
+        slope = np.where(is_at_origin, whole, slope)
+        value = np.where(is_at_origin, beyond * value + spring * factor * s, value)
         return value / (slope + value * inverse.sum(axis=2))
 
     def _of_arms(

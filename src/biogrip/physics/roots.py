@@ -143,16 +143,16 @@ def interlaced_zeros(weights: NDArray[Any], poles: Array, level: NDArray[Any]) -
     real = np.concatenate((weights.real, poles, level.real[None]))
     _, first, which = np.unique(real, axis=1, return_index=True, return_inverse=True)
     of_some = _real_zeros(weights.real[:, first], poles[:, first], level.real[first])
-    found = Zeros(of_some.pole[:, which], of_some.beyond[:, which])
+    zeros = Zeros(of_some.pole[:, which], of_some.beyond[:, which])
     # A Newton step is exact for an infinitesimal change of the weights.
-    change = -np.imag(level) * np.ones_like(found.pole)
-    slope = np.zeros_like(found.pole)
+    change = -np.imag(level) * np.ones_like(zeros.pole)
+    slope = np.zeros_like(zeros.pole)
     for pole, weight in zip(poles, weights, strict=True):
-        distance = found.from_pole(pole)
+        distance = zeros.from_pole(pole)
         term = weight / distance
         change += term.imag
         slope -= term.real / distance
-    return Zeros(found.pole, found.beyond - 1j * change / slope)
+    return Zeros(zeros.pole, zeros.beyond - 1j * change / slope)
 
 
 # Up to so many points a matrix of poles and points is faster than a loop over the poles.
@@ -192,7 +192,7 @@ def _real_zeros(weights: Array, poles: Array, level: Array) -> Zeros:
     if len(poles) == 2:
         return zeros_of_one_branch(tuple(weights), poles[1], level)
     pole, side, gap, start = _intervals(weights, poles, level)
-    found = start.copy()
+    distance = start.copy()
     # State of the search for each unfinished zero: its pole, the side of it, the gap to the next
     # one, bounds of the distance, and the distance.
     search = np.array([pole, side, gap, np.zeros_like(pole), 0.5 * gap, start]).reshape(6, -1)
@@ -212,11 +212,11 @@ def _real_zeros(weights: Array, poles: Array, level: Array) -> Zeros:
         np.copyto(moved, at, where=converged)
         # Convergence is quadratic, so after a short step the error is below rounding.
         converged |= np.abs(moved - at) <= _LAST_STEP * moved
-        at[:] = found.flat[left] = moved
+        at[:] = distance.flat[left] = moved
         left, search = left[~converged], search[:, ~converged]
         if not len(left):
             break
-    return Zeros(pole, side * found)
+    return Zeros(pole, side * distance)
 
 
 def _intervals(weights: Array, poles: Array, level: Array) -> tuple[Array, Array, Array, Array]:
@@ -270,12 +270,12 @@ def _nearer(
 ) -> Array:
     """Return improved distances of zeros from their poles; those from `last` on are beyond all."""
     inner = (value, sides.below_slope, sides.above_slope, side, gap, at)
-    found = np.empty_like(value)
-    found[:last] = _between(*(of[:last] for of in inner))
+    nearer = np.empty_like(value)
+    nearer[:last] = _between(*(of[:last] for of in inner))
     # Beyond all poles the reciprocal of the sum is concave and nearly linear: Newton's method.
     slope = level[last:] * sides.below_slope[last:]
-    found[last:] = at[last:] - sides.below[last:] * value[last:] / slope
-    return found
+    nearer[last:] = at[last:] - sides.below[last:] * value[last:] / slope
+    return nearer
 
 
 def _between(
@@ -289,5 +289,5 @@ def _between(
     half = 0.5 * (p + q - c * gap)
     root = np.sqrt(np.maximum(half * half + c * p * gap, 0))
     with np.errstate(divide="ignore", invalid="ignore"):
-        found: Array = np.where(half > 0, p * gap / (half + root), (root - half) / c)
-    return found
+        zero: Array = np.where(half > 0, p * gap / (half + root), (root - half) / c)
+    return zero

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from biogrip.arrays import Array, IntArray
+from biogrip.physics.units import per_second_of, suffix_of
 
 
 @dataclass(frozen=True)
@@ -56,19 +57,6 @@ MOST_BRANCHES = 8
 """Most Maxwell branches of a generalized model."""
 
 
-# Units of dampings by those of stiffnesses: of a sample under a force, under a stress, and of one
-# whose moduli are shares of another.
-_DAMPINGS = {"N/m": "N s/m", "Pa": "Pa s", "": "s"}
-_SUFFIXES = {
-    "N/m": "_N_per_m",
-    "N s/m": "_Ns_per_m",
-    "Pa": "_Pa",
-    "Pa s": "_Pa_s",
-    "s": "_s",
-    "": "",
-}
-
-
 @dataclass(frozen=True)
 class Parameter:
     """A parameter of a sample model."""
@@ -86,18 +74,18 @@ class Parameter:
     below: float = inf
     """Upper bound of all values, if there is one."""
     stiffness: str = "N/m"
-    """Unit of stiffnesses: N/m, Pa, or none if they are shares of another."""
+    """Unit of stiffnesses: N/m, Pa, N m/rad, or none if they are shares of another."""
 
     @property
     def unit(self) -> str:
         """SI unit; empty if it has none."""
-        dimensions = {"damping": _DAMPINGS[self.stiffness], "exponent": ""}
+        dimensions = {"damping": per_second_of(self.stiffness), "exponent": ""}
         return dimensions.get(self.kind, self.stiffness)
 
     @property
     def column(self) -> str:
         """Name of the parameter's column in result files."""
-        return self.name + _SUFFIXES[self.unit]
+        return self.name + suffix_of(self.unit)
 
     @property
     def symbol(self) -> str:
@@ -193,7 +181,7 @@ class SampleModel:
     def moduli(self, parameters: Mapping[str, float], omega: Array) -> dict[str, Array]:
         """Return storage and loss moduli at frequencies in rad/s, (n_omega,), in named columns."""
         storage, loss = complex_modulus(self.sample(parameters), omega)
-        suffix = _SUFFIXES[self.stiffness_unit]
+        suffix = suffix_of(self.stiffness_unit)
         return {"omega_per_s": omega, f"storage{suffix}": storage[0], f"loss{suffix}": loss[0]}
 
     def sample(self, parameters: Mapping[str, float]) -> Network:

@@ -9,6 +9,7 @@ from collections.abc import Collection, Mapping
 from contextlib import suppress
 from math import pi
 from pathlib import Path
+from shlex import quote
 from unicodedata import normalize
 
 from biogrip.errors import BiogripError, nearest
@@ -16,8 +17,12 @@ from biogrip.physics.instruments import (
     DISPLACEMENT,
     INSTRUMENTS,
     MODULUS,
+    PHASE,
+    ROTATION,
+    STRAIN,
     Channel,
 )
+from biogrip.physics.shapes import KNOWN_SHAPES, Shape
 from biogrip.terminal import visible
 
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0, "d": 86_400.0}
@@ -39,11 +44,16 @@ _SPELLED_OUT = {
     "mrad": ("milliradian", "milliradians"),
     "urad": ("microrad", "microradian", "microradians"),
     "deg": ("degree", "degrees"),
+    "um": ("micron", "microns", "micrometer", "micrometers", "micrometre", "micrometres"),
+    "nm": ("nanometer", "nanometers", "nanometre", "nanometres"),
+    "mm": ("millimeter", "millimeters", "millimetre", "millimetres"),
+    "N": ("newton", "newtons"),
+    "Hz": ("hertz",),
     "1": ("-", "\u2212", "\u2013", "in/in", "mm/mm", "m/m", "um/um", "nm/nm"),
     "%": ("percent", "pct"),
     "‰": ("permille", "mstrain", "millistrain", "mε", "mm/m"),
     "ppm": ("ustrain", "microstrain", "uε", "um/m"),
-    "Pa": ("n/m2", "n/m^2"),
+    "Pa": ("n/m2", "n/m^2", "pascal", "pascals"),
     "kPa": ("kn/m2", "kn/m^2"),
     "MPa": ("n/mm2", "n/mm^2"),
 }
@@ -68,8 +78,20 @@ _PURE = re.compile(
 _RATIO = re.compile(r"[^\W\d_]+\d*\s*/\s*([^\W_]+)")
 # 1/s in a column of this name is rad/s; in another it may as well be Hz.
 _ANGULAR = re.compile("ang|omega|ω|kreis", re.I)
-_UNITS = {*TIME_UNITS, *["V", "mV", "uV", "A", "mA", "px", "pixel", "pixels", "counts"]}
-_UNITS |= {unit for each in INSTRUMENTS.values() for unit in each.read.units}
+_READING_UNITS = {unit for instrument in INSTRUMENTS.values() for unit in instrument.read.units}
+_UNITS = {
+    *TIME_UNITS,
+    "V",
+    "mV",
+    "uV",
+    "A",
+    "mA",
+    "px",
+    "pixel",
+    "pixels",
+    "counts",
+    *_READING_UNITS,
+}
 _NUMBERED = re.compile(r"[ _]?(\d+|\(\d*\)|\[\d*\])$")
 # A number with what may be its unit behind it.
 _SIZED = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s*(.*?)\s*", re.I)
@@ -85,11 +107,14 @@ def unit_of(
     allowed: Mapping[str, float],
     said_by: str,
     below: str = "",
+    *,
+    scaled: bool = False,
 ) -> str:
     """Return the unit of a column, a key of `allowed`; if ``1`` is among them, none need be given.
 
     It is `given`, at the end of the column's name, or in its cell `below` in a row of units. What
-    states it, `said_by`, is for messages. A `BiogripError` says that no allowed unit is given, or
+    states it, `said_by`, is for messages. A unit that is given may be of another kind than the
+    column's only if this is `scaled`. A `BiogripError` says that no allowed unit is given, or
     which of name, cell and statement contradict each other.
     """
     where, choices = place(path, column=column), ", ".join(allowed)
@@ -99,6 +124,7 @@ def unit_of(
     unit = (at_end or in_row) if given is None else known_unit(given, allowed)
     if given is not None and unit is None:
         raise BiogripError(f"{where}: found the unit '{given}', allowed are {choices}.")
+    in_row = in_row or (known_unit(_bare(below), _READING_UNITS) if given and not scaled else None)
     of_frequency = unit == "1/s" and "Hz" in allowed
     if of_frequency and not _ANGULAR.search(plain_name(column)):
         raise BiogripError(f"{where}: found the unit 1/s; allowed are rad/s or Hz, by {said_by}.")
@@ -112,8 +138,14 @@ def unit_of(
         if not end:
             row, how = f"{row}, neither stated (by {said_by}) nor at the end of the name", ""
         of_moduli = not end and allowed == MODULUS.units
-        share = " What is over another modulus, as G/G0, is a relative_modulus." * of_moduli
-        raise BiogripError(f"{where}: found {found}{row}; allowed are {choices}{how}.{share}")
+        hint = " What is over another modulus, as G/G0, is a relative_modulus." * of_moduli
+        if allowed == ROTATION.units:
+            names = (name for name in INSTRUMENTS if name in plain_name(column).lower())
+            example = f"{next(names, STRAIN.name)}={column}"
+            hint = f" Which quantity is it? Say so, as by --reading {quote(example)}."
+        elif allowed == STRAIN.units and known_unit(end or _bare(below), DISPLACEMENT.units):
+            hint = " A length is a strain by the sample's shape, see --shape, or by a scale."
+        raise BiogripError(f"{where}: found {found}{row}; allowed are {choices}{how}.{hint}")
     for other, said in ((at_end, "the name"), (in_row, "the row of units")):
         if other not in (None, unit):
             raise BiogripError(
@@ -163,13 +195,24 @@ def number_and_unit(text: str) -> tuple[float, str]:
     return float(found[1]), found[2]
 
 
-def length_m(text: str) -> float | None:
-    """Return a length with its unit, as in ``2.5 um``, in m; None if it is none above 0."""
-    with suppress(ValueError):
-        number, written = number_and_unit(text)
-        unit = known_unit(written, DISPLACEMENT.units)
-        return number * DISPLACEMENT.units[unit] if unit and number > 0 else None
-    return None
+def shape_and_sizes(text: str) -> tuple[Shape, list[float]]:
+    """Return the shape of a text like ``cylinder 8 mm x 4 mm``, and its sizes in m or rad.
+
+    A `ValueError` says what is allowed.
+    """
+    name, _, rest = plain_name(text).partition(" ")
+    if (shape := KNOWN_SHAPES.get(name)) is None:
+        examples = ", ".join(f"'{known.example}'" for known in KNOWN_SHAPES.values())
+        raise ValueError(f"found '{shortened(text)}', allowed are, as examples, {examples}")
+    sizes, units = list[float](), shape.sizes.units
+    with suppress(ValueError, KeyError):
+        for part in re.split(r"\s+x\s+|\s*,\s*", rest):
+            number, written = number_and_unit(part)
+            sizes.append(number * units[known_unit(written, units) or written])
+    most = pi / 2 if shape.sizes is PHASE else 1.0
+    if len(sizes) != shape.example.count(" x ") + 1 or not all(0 < size < most for size in sizes):
+        raise ValueError(f"found '{shortened(text)}', allowed is as in '{shape.example}'")
+    return shape, sizes
 
 
 def held_unit(value: float | str, controlled: Channel, by: str = "--hold") -> tuple[float, str]:

@@ -11,7 +11,7 @@ from typing import Annotated
 
 from pydantic import BeforeValidator, Field, Tag
 
-from biogrip.keys import BY_KIND, Block, Complaint, OneOf
+from biogrip.keys import BY_KIND, Block, Complaint, Distinct, OneOf
 from biogrip.physics.instruments import (
     INSTRUMENTS,
     PARTNERS,
@@ -20,14 +20,14 @@ from biogrip.physics.instruments import (
     STRESS,
     Channel,
     Instrument,
-    under_sphere,
 )
 from biogrip.physics.noise import Noise
+from biogrip.physics.shapes import INCOMPRESSIBLE, under_shape
 from biogrip.traces.columns import (
     AXES,
     TIME_UNITS,
     known_unit,
-    length_m,
+    shape_and_sizes,
     trace_file_problem,
 )
 
@@ -43,7 +43,7 @@ READINGS = tuple(INSTRUMENTS)
 
 _FREQUENCIES = AXES["frequency"]
 _SWEPT = tuple(name for name, instrument in INSTRUMENTS.items() if instrument.sweeps)
-_OF_SWEEPS = ("frequency", "frequency_unit", *PARTNERS, "partner_unit", "loss_sd")
+_OF_SWEEPS = ("frequency", "frequency_unit", *PARTNERS, "partner_unit", "loss_sd", "phase_sd_rad")
 # Keys of simulated traces, too; the others are of a file.
 _OF_ALL = {"rate_Hz", "file", "noise", "noise_model", "offset", "drift"}
 # Keys that no option of the command sets but `--set`, with what they may say.
@@ -55,7 +55,7 @@ _BY_SET = {
     "rotation_unit": "UNIT",
     "reading_unit": "UNIT",
     "load_unit": "UNIT",
-    "block": "N",
+    "load_scale": "-1",
     "average_repeated": "true",
     "scale": "-1",
 }
@@ -69,6 +69,15 @@ def _unit(allowed: Mapping[str, float]) -> BeforeValidator:
 
 
 _Name = Annotated[str | None, Field(min_length=1, max_length=4000)]
+
+_BlockNumber = Annotated[int, Field(ge=1, le=1_000_000)]
+_Blocks = Annotated[
+    Annotated[_BlockNumber, Tag("a number")]
+    | Annotated[
+        Distinct[tuple[_BlockNumber, ...]], Field(min_length=1, max_length=1000), Tag("a list")
+    ],
+    BY_KIND,
+]
 
 _Value = Annotated[Annotated[float, Tag("a number")] | Annotated[str, Tag("text")], BY_KIND]
 
@@ -105,6 +114,9 @@ class MeasurementBlock(Block):
     """Name of the column of storage moduli of a frequency sweep (`instrument: oscillation`)."""
     complex_modulus: _Name = None
     """Name of the column of absolute values of the complex modulus (oscillation)."""
+    complex_viscosity: _Name = None
+    """Name of the column of complex viscosities, moduli over the angular frequency
+    (oscillation)."""
     storage_stiffness: _Name = None
     """Name of the column of storage stiffnesses, in N/m (oscillation)."""
     frequency: _Name = None
@@ -129,8 +141,10 @@ class MeasurementBlock(Block):
     reading_unit: Annotated[str | None, Field(min_length=1, max_length=20)] = None
     """Unit of what another instrument reads, where the column's name does not end in it; of strains
     by default 1."""
-    block: Annotated[int | None, Field(ge=1, le=1_000_000)] = None
-    """Number of the block to read, where several tables follow one another in the file."""
+    block: _Blocks | None = None
+    """Number of the block to read, where several tables follow one another in the file; or a list,
+    as `[1, 2]`, of blocks that are one test, such as creep and recovery, to join in this order.
+    Times that begin anew in one go on from the last one before."""
     rows: Annotated[Mapping[str, _Value], Field(min_length=1)] | None = None
     """Values of other columns in the rows to use, as `{Segment: dwell}`; the others are left
     out."""
@@ -141,10 +155,19 @@ class MeasurementBlock(Block):
     Only for `biogrip identify`."""
     load_unit: Annotated[str | None, Field(min_length=1, max_length=20)] = None
     """Unit of the column `load`, where its name does not end in it."""
-    sphere: Annotated[str | None, Field(min_length=1, max_length=40)] = None
-    """Radius of a sphere that indents the sample, with its unit, as `2.5 um`. The column of the
-    stress then has its force, and that of the strain its indentation, and moduli are Young's, by
-    Hertz's contact with an incompressible sample."""
+    load_scale: Annotated[float | None, Field(ge=-1e30, le=1e30)] = None
+    """Load, in its unit, over the number in its column, as `scale` is of the readings: -1 for a
+    tip's separation, which is negative in contact. By default 1."""
+    shape: Annotated[str | None, Field(min_length=1, max_length=60)] = None
+    """What stands between force and modulus, with its sizes, as `sphere 2.5 um`, `cone 35 deg`,
+    `pyramid 17.5 deg`, `punch 2 um`, `pipette 2.5 um` or `cylinder 8 mm x 4 mm`. The columns then
+    have forces, of a pipette stresses, and displacements, and moduli are Young's."""
+    poisson: Annotated[float | None, Field(ge=0, le=0.5)] = None
+    """Poisson's ratio of a sample that a tip indents. By default 0.5, incompressible."""
+    fit_contact: bool = False
+    """If true, fit the depth along at which a tip touches the sample, as where its contact was set
+    by eye; the limits allow for its uncertainty. It takes readings of the approach. By default
+    false."""
     average_repeated: bool = False
     """If true, average the readings of equal times, as a rounded clock writes them."""
     from_s: Annotated[float | None, Field(ge=-1e12, le=1e12)] = None
@@ -172,6 +195,8 @@ class MeasurementBlock(Block):
     """Standard deviation of the noise as a share of the rotation, with weights as by sd. To it is
     added noise_rad, squared; without that, it is at least the scatter of the tenth of the readings
     with the smallest rotations."""
+    phase_sd_rad: Annotated[float | None, Field(gt=0, le=1)] = None
+    """Standard deviation of a sweep's phases; `noise_share` is then that of its amplitudes."""
     offset: bool | None = None
     """If true, fit a constant offset of the instrument along. By default only with a coloured noise
     model."""
@@ -197,8 +222,23 @@ class MeasurementBlock(Block):
     @property
     def instrument(self) -> Instrument:
         """The instrument of a recorded trace, with the units that its columns may have."""
-        instrument, radius_m = INSTRUMENTS[self.readings[0]], length_m(self.sphere or "")
-        return under_sphere(instrument, radius_m) if radius_m else instrument
+        instrument = INSTRUMENTS[self.readings[0]]
+        if self.shape is None:
+            return instrument
+        poisson = INCOMPRESSIBLE if self.poisson is None else self.poisson
+        return under_shape(instrument, *shape_and_sizes(self.shape), poisson)
+
+    @property
+    def has_tip(self) -> bool:
+        """True if a tip indents the sample, of which nothing holds while its contact shrinks."""
+        return self.shape is not None and shape_and_sizes(self.shape)[0].is_tip
+
+    @property
+    def tip_power(self) -> float | None:
+        """Exponent of a recorded depth of a tip; None if none was recorded."""
+        recorded = self.has_tip and self.load is not None
+        controlled = self.instrument.controlled if recorded else None
+        return controlled.power if controlled and controlled.name == STRAIN.name else None
 
     @property
     def partner(self) -> Channel | None:
@@ -216,6 +256,20 @@ class MeasurementBlock(Block):
         partner = [self.partner.name] if self.partner else []
         keys = (self.axis, self.readings[0], *partner, "sd", "loss_sd", "load")
         return {key: name for key in keys if (name := getattr(self, key)) is not None}
+
+    @property
+    def blocks(self) -> tuple[int, ...]:
+        """Numbers of the blocks to read, in their order; none if nothing says which."""
+        return (self.block,) if isinstance(self.block, int) else self.block or ()
+
+    def units_of(self, key: str) -> Mapping[str, float]:
+        """Return the units that a column of `named` may have."""
+        if key == self.axis:
+            return AXES[key]
+        if key == "load":
+            return self.instrument.controlled.units
+        partner = self.partner
+        return partner.units if partner and key == partner.name else self.instrument.read.units
 
     @property
     def axis_column(self) -> str:
@@ -252,8 +306,11 @@ class MeasurementBlock(Block):
                 yield (key,), "is that of white noise; leave it out where noise_model is coloured."
             if self.sd is not None and key != "sd":
                 yield (key,), "does not go with sd, which says all of the noise."
-        if self.scale == 0:
-            yield ("scale",), "found 0, allowed is another number."
+        for key in ("scale", "load_scale"):
+            if getattr(self, key) == 0:
+                yield (key,), "found 0, allowed is another number."
+        if self.load_scale is not None and self.load is None:
+            yield ("load_scale",), "goes with load, the column that it scales."
         for other in ("start_s", "load"):
             if self.fit_start and getattr(self, other) is not None:
                 yield ("fit_start",), f"does not go with {other}; allowed is one of them."
@@ -282,12 +339,15 @@ class MeasurementBlock(Block):
             found = " and ".join(sorted(partners)) or "none"
             text = f"goes with one of {', '.join(PARTNERS)}; found {found}"
             yield (self.readings[0],), f"{text}. Say which, as in --reading loss=COLUMN."
-        if len(given & {"sd", "loss_sd"}) == 1 or ("sd" in given and "loss" not in given):
+        alone = len(given & {"sd", "loss_sd"}) == 1 or ("sd" in given and "loss" not in given)
+        if alone or {"sd", "complex_viscosity"} <= given:
             yield ("sd",), "of a sweep goes with loss and loss_sd: both moduli need deviations."
         for key in sorted(given & {"start_s", "load", "fit_start", "offset", "drift"}):
             yield (key,), "is of a trace in time, and this is a frequency sweep; leave it out."
         if self.coloured:
             yield ("noise_model",), "found coloured, allowed with a frequency sweep is white."
+        if self.phase_sd_rad is not None and self.noise_share is None:
+            yield ("phase_sd_rad",), "goes with noise_share, that of the amplitudes."
 
     def _reading_complaints(self) -> Iterator[Complaint]:
         if not self.readings:
@@ -302,19 +362,34 @@ class MeasurementBlock(Block):
             right, wrong = wrong, right
         if getattr(self, wrong) is not None:
             yield (wrong,), f"does not go with {name}; allowed is {right}."
-        if self.sphere is not None:
-            if length_m(self.sphere) is None:
-                text = f"found '{self.sphere}', allowed is a radius with its unit, as in '2.5 um'."
-                yield ("sphere",), text
-                return
-            if name not in (STRESS.name, STRAIN.name):
-                yield ("sphere",), f"goes with a force or an indentation, not with {name}."
-                return
+        if complaints := [*self._shape_complaints(name)]:
+            yield from complaints
+            return
+        if self.fit_contact and self.tip_power is None:
+            text = "takes the shape of a tip, and a recorded depth (--load)"
+            yield ("fit_contact",), f"{text}: of a dwell alone nothing tells it."
         instrument = self.instrument
         for key, of in (("reading_unit", instrument.read), ("load_unit", instrument.controlled)):
             unit = getattr(self, key)
             if unit is not None and known_unit(unit, of.units) is None:
                 yield (key,), f"found '{unit}', allowed are {', '.join(of.units)}."
+
+    def _shape_complaints(self, name: str) -> Iterator[Complaint]:
+        """Find what is wrong with a shape, where a quantity is read."""
+        if self.shape is None:
+            if self.poisson is not None:
+                yield ("poisson",), "goes with the shape of a tip."
+            return
+        try:
+            shape, _ = shape_and_sizes(self.shape)
+        except ValueError as error:
+            yield ("shape",), f"{error}."
+            return
+        if name not in (STRESS.name, STRAIN.name):
+            load = "pressure" if shape.load == STRESS else "force"
+            yield ("shape",), f"goes with a {load} or a displacement, not with {name}."
+        elif self.poisson is not None and not shape.is_tip:
+            yield ("poisson",), f"goes with the shape of a tip, not with '{self.shape}'."
 
 
 UNREAD = MeasurementBlock(rate_Hz=1.0, noise=Noise("gaussian", 0.0, "peak"))

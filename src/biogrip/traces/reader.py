@@ -1,6 +1,6 @@
 """Reader of recorded traces in the user's own files, with gaps, units and line numbers."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import isfinite
 from pathlib import Path
@@ -12,10 +12,11 @@ import numpy as np
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.digits import counted, plain
 from biogrip.errors import BiogripError, nearest
-from biogrip.physics.instruments import INSTRUMENTS, PHASE, ROTATION
+from biogrip.physics.instruments import INSTRUMENTS, PHASE, ROTATION, VISCOSITY
 from biogrip.physics.protocol import joined
 from biogrip.terminal import visible
 from biogrip.traces.columns import AXES, listed, place, shortened, unit_of
+from biogrip.traces.conditions import are_repeats, is_like, tells_apart
 from biogrip.traces.measurement_block import UNREAD, MeasurementBlock
 from biogrip.traces.tables import (
     BLANKS,
@@ -70,6 +71,8 @@ class Recording:
     """Units of the times and of the readings in the file."""
     sd: Array | None = None
     """Standard deviations of the readings, (n_samples,), where they are known."""
+    correlation: Array | None = None
+    """Correlation of the noise of both moduli of a sweep, (n_frequencies,), ascending."""
     sd_known: bool = True
     """False if only their ratios are, as of a sweep of which nothing says the noise."""
     onset_s: float | None = None
@@ -128,8 +131,7 @@ class Recording:
         if self.load_noise:
             said.append(
                 f"Smoothed out of {self.read.load}, since the readings do not follow it: what "
-                f"scatters from row to row by {plain(100 * self.load_noise, 2)} % of the largest. "
-                "What is left counts as exact."
+                f"scatters from row to row by {plain(100 * self.load_noise, 2)} % of the largest."
             )
         if "unclear" in form:
             said.append(
@@ -171,9 +173,10 @@ def read_recording(path: Path, columns: MeasurementBlock) -> Recording:
     """Read the columns of a recorded trace from a file.
 
     The header is the line that has the columns, or has a row of units below it; of several such
-    tables, ``block`` says which. With semicolons or tabs between cells numbers may have a decimal
-    comma; one table has one decimal mark, and other marks are between thousands. Times may be
-    hours:minutes:seconds, after a date or not. Other columns may hold anything.
+    tables, ``block`` says which, or which are one test. With semicolons or tabs between cells
+    numbers may have a decimal comma; one table has one decimal mark, and other marks are between
+    thousands. Times may be hours:minutes:seconds, after a date or not. Other columns may hold
+    anything.
 
     An empty cell, ``nan``, ``NA``, ``N/A``, ``#N/A``, ``#NV`` (in any case) or ``-`` is a gap. Its
     row is left out and counted; nothing is interpolated. A `BiogripError` has file, line and column
@@ -184,8 +187,63 @@ def read_recording(path: Path, columns: MeasurementBlock) -> Recording:
         # As by --reading modulus, of a column modulus_Pa.
         usual: dict[str, Any] = {quantity.name: quantity.column}
         columns = replace(columns, **usual)
-    tables, index = find_tables(path, sheet, columns)
-    table = tables[index]
+    tables, places = find_tables(path, sheet, columns)
+    parts = [_read_block(path, sheet, tables[place], columns) for place in places]
+    values, lines, units, form, remarks = _joined_blocks(columns, parts)
+    load, chosen = None, np.concatenate([part.chosen for part in parts])
+    _check_conditions(path, columns, values[chosen], lines[chosen], sheet, tables[places[0]])
+    if columns.load is not None:
+        history, values = values[:, [0, -1]], values[:, :-1]
+        numbers = ~np.any(np.isnan(history), axis=1)
+        if np.any(np.diff(history[numbers, 0]) < 0):
+            # Rows of other samples, one below the other, have loads of their own.
+            numbers &= chosen
+        load = _load(path, columns, history[numbers], lines[numbers], units)
+        # Nothing tells what came before its first row with a number, nor after the last.
+        begins, ends = history[numbers][[0, -1], 0]
+        values[(values[:, 0] < begins) | (values[:, 0] > ends), 1:] = np.nan
+    table, several = tables[places[0]], len(tables) > 1
+    names = (table.names[index] for index in parts[0].indices)
+    names_and_units = ({"column": n, "unit": unit} for n, unit in zip(names, units, strict=True))
+    recording = _checked(path, columns, units, values[chosen], lines[chosen])
+    form = {
+        "encoding": sheet.encoding,
+        "separator": _SEPARATORS[sheet.separator],
+        **form,
+        "header_line": int(sheet.numbers[table.at]) or None,
+        "units_line": None if table.units_at is None else int(sheet.numbers[table.units_at]),
+        "block": columns.block or places[0] + 1 if several else None,
+        "blocks": len(tables) if several else None,
+        "preamble": table.title or None,
+        "columns": dict(zip(columns.named, names_and_units, strict=True)),
+        "rows": len(values),
+        **recording.form,
+        "others": int(np.count_nonzero(~chosen)) or None,
+        **(_signs_of_a_cut(sheet, tables[-1]) if max(places) + 1 == len(tables) else {}),
+    }
+    form = {key: value for key, value in form.items() if value is not None}
+    return replace(recording, form=form, load=load, remarks_before=remarks)
+
+
+@dataclass(frozen=True)
+class _TablePart:
+    """What was read of a table."""
+
+    indices: list[int]
+    """Where the columns are."""
+    units: list[str]
+    """Their units."""
+    values: Array
+    """Their numbers in these units, (n_rows, n_columns), NaN for gaps."""
+    lines: IntArray
+    """Line numbers, (n_rows,)."""
+    chosen: BoolArray
+    """True for rows to use, (n_rows,)."""
+    form: dict[str, Any]
+    """What marks the numbers have."""
+
+
+def _read_block(path: Path, sheet: Sheet, table: Table, columns: MeasurementBlock) -> _TablePart:
     header_line = int(sheet.numbers[table.at]) or None
     axis, rows = columns.axis_column, slice(table.first, table.end)
     times = [cell for i in table.indices(axis)[:1] for cell in sheet.cells[rows, i].tolist()]
@@ -195,38 +253,52 @@ def read_recording(path: Path, columns: MeasurementBlock) -> Recording:
             f"{place(path, sheet.numbers[table.first], axis)}: found '{shortened(times[0])}'; "
             "allowed are numbers, or hh:mm:ss, alone or after a date as 2026-11-25 or 25.11.2026."
         )
+    if table.end <= table.first and table.common(columns) == len(columns.named):
+        raise BiogripError(
+            f"{place(path, header_line)}: found names of columns without rows of numbers below "
+            "them, allowed is a table with rows."
+        )
     indices, units = _columns_of(path, header_line, table, columns, clock=clock)
     values, form = _numbers(path, sheet, table, indices, clock=clock)
-    lines, load = sheet.numbers[rows], None
-    if columns.load is not None:
-        history, values = values[:, [0, -1]], values[:, :-1]
-        numbers = ~np.any(np.isnan(history), axis=1)
-        load = _load(path, columns, history[numbers], lines[numbers], units)
-        # Nothing tells what came before its first row with a number, nor after the last.
-        begins, ends = history[numbers][[0, -1], 0]
-        values[(values[:, 0] < begins) | (values[:, 0] > ends), 1:] = np.nan
     chosen = _chosen(path, sheet, table, columns)
-    names_and_units = (
-        {"column": table.names[i], "unit": unit} for i, unit in zip(indices, units, strict=True)
-    )
-    several = len(tables) > 1
-    found = _checked(path, columns, units, values[chosen], lines[chosen])
-    form = {
-        "encoding": sheet.encoding,
-        "separator": _SEPARATORS[sheet.separator],
-        **form,
-        "header_line": header_line,
-        "units_line": None if table.units is None else int(sheet.numbers[table.first - 1]),
-        "block": index + 1 if several else None,
-        "blocks": len(tables) if several else None,
-        "preamble": table.title or None,
-        "columns": dict(zip(columns.named, names_and_units, strict=True)),
-        "rows": len(values),
-        **found.form,
-        "others": int(np.count_nonzero(~chosen)) or None,
-        **(_signs_of_a_cut(sheet, table) if table is tables[-1] else {}),
-    }
-    return replace(found, form={key: it for key, it in form.items() if it is not None}, load=load)
+    return _TablePart(indices, units, values, sheet.numbers[rows], chosen, form)
+
+
+def _joined_blocks(
+    columns: MeasurementBlock, parts: Sequence[_TablePart]
+) -> tuple[Array, IntArray, list[str], dict[str, Any], tuple[str, ...]]:
+    """Join blocks of one test: values in the first one's units, lines, units, form, remarks.
+
+    Times that begin anew go on from the last one before; from zero, after its last interval.
+    """
+    first, remarks = parts[0], list[str]()
+    rows = [first.values]
+    for number, part in zip(columns.blocks[1:], parts[1:], strict=False):
+        sizes = [
+            columns.units_of(key)[unit] / columns.units_of(key)[to]
+            for key, unit, to in zip(columns.named, part.units, first.units, strict=True)
+        ]
+        values = part.values * sizes
+        (before, last), begins = _last_two(rows[-1][:, 0]), np.nanmin(values[:, 0], initial=np.inf)
+        if columns.axis == "time" and begins <= last:
+            later = last if begins > 0 else last + (last - before)
+            values[:, 0] += later
+            remarks.append(
+                f"Times of block {number} begin anew at {begins:g} {first.units[0]}: they are "
+                f"counted on from {later:g} {first.units[0]}, where the block before it ends."
+            )
+        rows.append(values)
+    joined_rows, form = np.concatenate(rows), first.form
+    if str(form.get("clock")).startswith("dates"):
+        joined_rows[:, 0] -= np.nanmin(joined_rows[:, 0])
+    lines = np.concatenate([part.lines for part in parts])
+    return joined_rows, lines, first.units, form, tuple(remarks)
+
+
+def _last_two(times: Array) -> Array:
+    """Return the last two of some times that are numbers, (n_rows,)."""
+    numbers = times[~np.isnan(times)]
+    return np.append([0.0, 0.0], numbers)[-2:]
 
 
 def recording_of_arrays(columns: MeasurementBlock, *arrays: Array) -> Recording:
@@ -312,8 +384,12 @@ def _checked(
     )
 
 
-def _no_column(path: Path, line: int | None, column: str, names: list[str]) -> str:
-    there = f"The file has: {listed(names)}.{nearest(column, names)}"
+def _no_column(
+    path: Path, line: int | None, column: str, names: list[str], read: Collection[str] = ()
+) -> str:
+    """Return that there is no such column, and which is nearest of those that are not read."""
+    near = nearest(column, [name for name in names if name not in read])
+    there = f"The file has: {listed(names)}.{near}"
     return f"{place(path, line)}: there is no column '{visible(column)}'. {there}"
 
 
@@ -333,8 +409,10 @@ def _both_moduli(
         found = f"found a frequency of {values[row, 0]:.3g}; allowed is one above 0"
         raise BiogripError(f"{place(path, lines[row])}: {found}.")
     first = values[:, 1] * (read.units[units[1]] * scale)
+    if read is VISCOSITY:
+        first = first * values[:, 0] * AXES[columns.axis][units[0]]
     second = values[:, 2] * partner.units[units[2]]
-    is_whole = read.name == "complex_modulus"
+    is_whole = read is VISCOSITY or read.name == "complex_modulus"
     if partner.unit == read.unit:
         loss = second * scale
         square = first**2 - loss**2
@@ -365,7 +443,7 @@ def _columns_of(
     for key, column in columns.named.items():
         same, where = table.indices(column), place(path, line, column)
         if not same:
-            said = _no_column(path, line, column, table.names)
+            said = _no_column(path, line, column, table.names, columns.named.values())
             problems.append(f"{said} Say which is which by {ways}{example}.")
             continue
         if len(same) > 1:
@@ -389,21 +467,21 @@ def _unit(
     path: Path | None, key: str, below: str, columns: MeasurementBlock, units: list[str]
 ) -> str:
     """Return the unit of a column; standard deviations have that of the readings before them."""
-    read, controlled = columns.instrument.read, columns.instrument.controlled
-    unit_key, allowed = "rotation_unit" if read == ROTATION else "reading_unit", read.units
+    read, allowed = columns.instrument.read, columns.units_of(key)
+    unit_key = "rotation_unit" if read == ROTATION else "reading_unit"
     given = columns.rotation_unit or columns.reading_unit
     if key == columns.axis:
-        unit_key, allowed = f"{key}_unit", AXES[key]
-        given = columns.time_unit or columns.frequency_unit
+        unit_key, given = f"{key}_unit", columns.time_unit or columns.frequency_unit
     elif columns.partner and key == columns.partner.name:
-        unit_key, allowed = "partner_unit", columns.partner.units
+        unit_key = "partner_unit"
         given = columns.partner_unit or (given if allowed == read.units else None)
     elif key == "load":
-        unit_key, allowed, given = "load_unit", controlled.units, columns.load_unit
+        unit_key, given = "load_unit", columns.load_unit
     elif key in ("sd", "loss_sd") and len(units) > 1:
         given = units[1]
-    said_by = columns.said_by(unit_key)
-    return unit_of(path, columns.named[key], given, allowed, said_by, below)
+    scale = columns.load_scale if key == "load" else columns.scale
+    said_by = columns.said_by(unit_key), below
+    return unit_of(path, columns.named[key], given, allowed, *said_by, scaled=scale is not None)
 
 
 def _numbers(
@@ -411,7 +489,7 @@ def _numbers(
 ) -> tuple[Array, dict[str, Any]]:
     """Return the numbers of columns, (n_rows, n_columns), NaN for gaps, and what marks they have.
 
-    If the first column has a clock's times, they are in s, from the first if there are dates.
+    If the first column has a clock's times, they are in s.
     """
     rows, width = slice(table.first, table.end), len(table.names)
     cells, lines = sheet.cells[rows], sheet.numbers[rows]
@@ -453,9 +531,8 @@ def _numbers(
     form |= {"unclear": "".join(marks.cells) or None}
     if clock:
         form["clock"] = "hours:minutes:seconds"
-        if (first := np.nanmin(values[:, 0])) > _DATED_S:
+        if np.nanmin(values[:, 0]) > _DATED_S:
             form["clock"] = "dates, from the first"
-            values[:, 0] -= first
         else:
             # Without dates it falls by a day at midnight.
             there = np.flatnonzero(~np.isnan(values[:, 0]))
@@ -486,12 +563,57 @@ def _chosen(path: Path, sheet: Sheet, table: Table, columns: MeasurementBlock) -
             raise BiogripError(_no_column(path, line, column, table.names))
         cells = [str(cell) for cell in sheet.cells[table.first : table.end, same[0]]]
         values = [*dict.fromkeys(cells)]
-        fits = {it for it in values if it == str(wanted) or number_or_inf(it) == wanted}
+        fits = {cell for cell in values if is_like(cell, wanted)}
         if not fits:
-            text = f"found no row with '{wanted}', allowed are {listed(values, 10)}."
+            shown = f"{wanted:g}" if isinstance(wanted, float) else wanted
+            text = f"found no row with '{shown}', allowed are {listed(values, 10)}."
             raise BiogripError(f"{where}: {text}{nearest(wanted, values)}")
         chosen &= [cell in fits for cell in cells]
     return chosen
+
+
+def _check_conditions(
+    path: Path,
+    columns: MeasurementBlock,
+    values: Array,
+    lines: IntArray,
+    sheet: Sheet,
+    table: Table,
+) -> None:
+    """Refuse rows of several conditions; the message names the column that tells them apart."""
+    numbers = ~np.any(np.isnan(values), axis=1)
+    places, lines = values[numbers, 0], lines[numbers]
+    falls = columns.axis == "time" and bool(np.any(np.diff(places) < 0))
+    if not falls and len(np.unique(places)) == len(places):
+        return
+    sweeps = columns.axis == "frequency"
+    scale = np.log(places) if sweeps and np.all(places > 0) else places
+    if not falls and are_repeats(scale, values[numbers, 1:]):
+        return
+    read = {index for name in columns.named.values() for index in table.indices(name)}
+    rows = sheet.cells[np.searchsorted(sheet.numbers, lines)]
+    others = {n: rows[:, i].tolist() for i, n in enumerate(table.names) if n and i not in read}
+    condition = tells_apart(places, others)
+    said = f"{place(path)}: found {_PLURALS[columns.axis]} again and again"
+    if condition:
+        there = (f"'{name}' ({listed(values, 5)})" for name, values in condition.items())
+        raise BiogripError(
+            f"{said}, in rows that {' and '.join(there)} tells apart; allowed are rows of one "
+            f"condition, as by {_option_of_rows(columns, condition)}."
+        )
+    if sweeps and not columns.average_repeated:
+        raise BiogripError(
+            f"{said}, with moduli that differ by more than noise, as of several conditions; "
+            "allowed are rows of one, in a file of their own or with a column that tells them "
+            "apart."
+        )
+
+
+def _option_of_rows(columns: MeasurementBlock, condition: Mapping[str, Sequence[str]]) -> str:
+    pairs = {name: values[0] for name, values in condition.items()}.items()
+    if columns.by_options:
+        return " ".join(f"--rows {quote(f'{name}={value}')}" for name, value in pairs)
+    return f"rows: {{{', '.join(f'{name}: {value}' for name, value in pairs)}}} under measurement"
 
 
 def _load(
@@ -502,9 +624,16 @@ def _load(
         history, lines, _ = _averaged(history, lines)
     _check_order(path, columns, history[:, 0], lines)
     time_s = history[:, 0] * AXES[columns.axis][units[0]]
-    sizes = columns.instrument.controlled.in_si(history[:, 1], units[-1])
-    # Before its contact a sphere neither presses nor indents.
-    return np.column_stack((time_s, np.maximum(sizes, 0.0) if columns.sphere else sizes))
+    scale = columns.load_scale or 1.0
+    sizes = columns.instrument.controlled.in_si(history[:, 1], units[-1], scale)
+    if columns.has_tip and not np.any(sizes > 0):
+        raise BiogripError(
+            f"{place(path, lines[0], columns.load)}: found nothing above zero, allowed is a "
+            f"depth or a force of a tip in contact: turn it by {columns.said_by('load_scale')}."
+        )
+    # Before its contact a tip does not press; where it touches may be fitted.
+    pressed = columns.has_tip and columns.tip_power is None
+    return np.column_stack((time_s, np.maximum(sizes, 0.0) if pressed else sizes))
 
 
 def _averaged(values: Array, lines: IntArray, first_sd: int = 2) -> tuple[Array, IntArray, int]:

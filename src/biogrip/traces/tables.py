@@ -1,10 +1,10 @@
 """Tables in a text file: its encoding and cells, and where its tables begin and end.
 
-A table is a row of names, perhaps a row of units, and rows of cells, perhaps below a preamble.
-Anton Paar's programs write lines like ``Interval:``, a row of names, perhaps an empty row, and a
-row of units in brackets. TRIOS writes ``[step]``, the name of the step, names, and bare units.
-NumPy and AFM programs write the names in a comment above the rows, and blanks between cells; and a
-table without names has numbers of columns.
+A table is a row of names, perhaps more rows of a header, as of units, and rows of cells, perhaps
+below a preamble. Anton Paar's programs write lines like ``Interval:``, a row of names, perhaps an
+empty row, and a row of units in brackets. TRIOS writes ``[step]``, the name of the step, names, and
+bare units. NumPy and AFM programs write the names in a comment above the rows, and blanks between
+cells; and a table without names has numbers of columns.
 """
 
 import csv
@@ -26,7 +26,6 @@ from biogrip.arrays import IntArray
 from biogrip.digits import counted
 from biogrip.errors import BiogripError
 from biogrip.traces.columns import (
-    AXES,
     in_brackets,
     listed,
     place,
@@ -66,6 +65,11 @@ _CLOCK = re.compile(_DATE + r"(\d{1,6}):([0-5]\d):([0-5]\d(?:[.,]\d+)?)" + _ZONE
 DAY_S = 86_400
 """Seconds of a day."""
 _GAPS = ("", "-", "na", "n/a", "#n/a", "#nv")
+# Looks like a number or a time, whatever its marks mean.
+_NUMERIC = re.compile(r"[-+]?\d[-+\d.,:;'\u2019\sTZeE]*|[-+]?[.,]\d[\deE+-]*")
+# What a spreadsheet writes of a failed formula.
+_FAILED_FORMULA = re.compile(r"#[A-Z]")
+_MOST_HEADER_ROWS = 5
 _PREAMBLE_LINES_SHOWN = 3
 _NAMES_SHOWN = 8
 _TABLES_SHOWN = 50
@@ -101,10 +105,12 @@ class Table:
     at: int
     """Place of the names."""
     names: list[str]
-    units: list[str] | None
-    """Cells of the row of units, if there is one."""
     first: int
     """Place of the first row; `end` is that after the last."""
+    units: list[str] | None = None
+    """Cells of the row of units, if there is one."""
+    units_at: int | None = None
+    """Its place."""
     is_step: bool = False
     """True if ``[step]`` and a name are right above the names."""
     end: int = 0
@@ -227,7 +233,9 @@ def _with_names(lines: Sequence[str], wanted: set[str]) -> list[tuple[str, int]]
         widest = range(1, len(_split(first[0], separator)) + 1)
         names = (separator.join(map(str, widest)), 0)
         return [*(own for own in plain if own[1] < first[1]), names, *plain[plain.index(first) :]]
-    said = {number: _COMMENT.sub("", line) for line, number in every if _COMMENT.match(line)}
+    said = {
+        number: _COMMENT.sub("", line, count=1) for line, number in every if _COMMENT.match(line)
+    }
     headers = _headers_in(said, plain, first, wanted)
     return _with_headers(every, said, headers) if headers else kept
 
@@ -252,20 +260,33 @@ def _headers_in(
 def _with_headers(
     every: list[tuple[str, int]], said: Mapping[int, str], headers: list[int]
 ) -> list[tuple[str, int]]:
-    """Return rows, and comments that are names, ``key: value`` above them or ``units:`` below."""
-    found = list[tuple[str, int]]()
-    for in_comments, group in groupby(every, lambda own: not own[0].strip() or own[1] in said):
+    """Return rows, and comments that are names, or above or below them of their header.
+
+    These are ``key: value`` above the names, ``units:`` below them, and words as many as the names.
+    """
+    kept = list[tuple[str, int]]()
+    for in_comments, group in groupby(every, lambda line: not line[0].strip() or line[1] in said):
         block = [*group]
         at = next((i for i, (_, number) in enumerate(block) if number in headers), None)
         if not in_comments:
-            found += block
+            kept += block
         elif at is not None:
             texts = [(said.get(number, "").strip(), number) for _, number in block]
-            found += (own for own in texts[:at] if ":" in own[0])
-            found.append((_BEFORE_NAMES.sub("", said[block[at][1]]), block[at][1]))
-            units = (own for own in texts[at + 1 :] if _BEFORE_UNITS.match(own[0]))
-            found += ((_BEFORE_UNITS.sub("", text), number) for text, number in units)
-    return found
+            names = _BEFORE_NAMES.sub("", said[block[at][1]])
+            kept += (line for line in texts[:at] if ":" in line[0] or _as_wide(line[0], names))
+            kept.append((names, block[at][1]))
+            bare = ((_BEFORE_UNITS.sub("", text), text, number) for text, number in texts[at + 1 :])
+            kept += ((b, n) for b, text, n in bare if b != text or _as_wide(text, names))
+    return kept
+
+
+def _as_wide(text: str, names: str) -> bool:
+    """Return True if a line has as many words as there are names, and no number among them."""
+    pairs = zip(_splits(text), _splits(names), strict=True)
+    return any(
+        len(words) == len(others) > 1 and not any(map(_NUMERIC.fullmatch, words))
+        for words, others in pairs
+    )
 
 
 def _split(line: str, separator: str) -> list[str]:
@@ -303,8 +324,10 @@ def _separator(lines: Sequence[str], headers: Sequence[str], columns: Measuremen
     return max((*SEPARATORS[::-1], BLANKS), key=merit)
 
 
-def find_tables(path: Path, sheet: Sheet, columns: MeasurementBlock) -> tuple[list[Table], int]:
-    """Find the tables of a file, and the index of the block to read, or the only one that can be.
+def find_tables(
+    path: Path, sheet: Sheet, columns: MeasurementBlock
+) -> tuple[list[Table], list[int]]:
+    """Find the tables of a file, and the indices of the blocks to read, or of the only one.
 
     A `BiogripError` lists the tables, if there is no such block, or several have the columns and
     none is asked for.
@@ -312,21 +335,23 @@ def find_tables(path: Path, sheet: Sheet, columns: MeasurementBlock) -> tuple[li
     tables = _tables(sheet, columns) or [_likely_table(sheet)]
     common = [table.common(columns) for table in tables]
     count = common.count(len(columns.named))
-    if columns.block is None and count <= 1:
-        return tables, common.index(max(common))
-    if columns.block is not None and columns.block <= len(tables):
-        return tables, columns.block - 1
-    found, allowed = f"no block {columns.block}", f"are 1 to {len(tables)}:"
-    if columns.block is None:
-        names = ", ".join(f"'{name}'" for name in columns.named.values())
-        found = f"{counted(count, 'block')} with the columns {names}"
-        allowed = f"is one: say which by {columns.said_by('block')}."
+    missing = [block for block in columns.blocks if block > len(tables)]
+    if not columns.blocks and count <= 1:
+        return tables, [common.index(max(common))]
+    if columns.blocks and not missing:
+        return tables, [block - 1 for block in columns.blocks]
+    said, allowed = f"no block {missing[0] if missing else 0}", f"are 1 to {len(tables)}:"
+    if not columns.blocks:
+        names, option = ", ".join(f"'{name}'" for name in columns.named.values()), "block: 1"
+        option, joined = ("--block 1", "--block 1,2") if columns.by_options else (option, "[1, 2]")
+        said = f"{counted(count, 'block')} with the columns {names}"
+        allowed = f"is one, as by {option}, or several that are one test, as by {joined}."
     shown = [
         f"\n  {number}: {_in_words(sheet, table, columns)}"
         for number, table in enumerate(tables[:_TABLES_SHOWN], 1)
     ]
     more = [f"\n  and {len(tables)} in all"] if len(tables) > _TABLES_SHOWN else []
-    raise BiogripError(f"{place(path)}: found {found}, allowed {allowed}{''.join(shown + more)}")
+    raise BiogripError(f"{place(path)}: found {said}, allowed {allowed}{''.join(shown + more)}")
 
 
 def _in_words(sheet: Sheet, table: Table, columns: MeasurementBlock) -> str:
@@ -344,11 +369,14 @@ def _in_words(sheet: Sheet, table: Table, columns: MeasurementBlock) -> str:
 
 
 def _tables(sheet: Sheet, columns: MeasurementBlock) -> list[Table]:
-    found = (_header(sheet, at, columns) for at in sheet.headers)
-    tables = [table for table in found if table is not None]
+    tables: list[Table] = []
+    for at in sheet.headers:
+        # Rows of a header are no names of another table.
+        if not tables or at >= tables[-1].first:
+            tables += filter(None, [_header(sheet, at, columns)])
     ends = [0, *(_end(sheet, *pair) for pair in pairwise(tables)), _last_end(sheet)]
     return [
-        replace(table, end=end, title=_title(sheet, start, table))
+        replace(table, end=max(end, table.first), title=_title(sheet, start, table))
         for table, (start, end) in zip(tables, pairwise(ends), strict=False)
     ]
 
@@ -368,22 +396,83 @@ def _header(sheet: Sheet, at: int, columns: MeasurementBlock) -> Table | None:
     or follows ``[step]`` and the name of a step.
     """
     is_step = at >= 2 and str(sheet.cells[at - 2, 0]).lower() == "[step]"
-    table = Table(at, sheet.cells[at, : sheet.widths[at]].tolist(), None, at + 1, is_step)
-    names, has_columns = table.names, table.common(columns) == len(columns.named)
-    if not has_columns and (_count_numbers(names) or sum(map(bool, names)) < 2):
+    table = Table(at, sheet.cells[at, : sheet.widths[at]].tolist(), at + 1, is_step=is_step)
+    if table.common(columns) == len(columns.named):
+        return _with_header_rows(sheet, table, columns)
+    filled = [name for name in table.names if name]
+    if _count_numbers(filled) or len(filled) < 2 or all(map(in_brackets, filled)):
         return None
-    below = [i for i in range(at + 1, min(at + 4, len(sheet.cells))) if any(sheet.cells[i])]
-    if below and not any(sheet.cells[below[0], len(names) :]):
-        units = sheet.cells[below[0], : len(names)].tolist()
-        numbers = _count_numbers(sheet.cells[below[1]]) if len(below) > 1 else 0
-        times = [units[i] for i in table.indices(columns.axis_column)]
-        if (
-            (is_step and numbers > _count_numbers(units))
-            or (all(in_brackets(unit) for unit in units if unit) and (has_columns or numbers > 0))
-            or (has_columns and any(unit_in_cell(unit, AXES[columns.axis]) for unit in times))
-        ):
-            return replace(table, units=units, first=below[0] + 1)
-    return table if has_columns else None
+    most = min(at + 1 + _MOST_HEADER_ROWS, len(sheet.cells))
+    below = [row for row in range(at + 1, most) if any(sheet.cells[row])]
+    if len(below) < 2 or any(sheet.cells[below[0], len(table.names) :]):
+        return None
+    units = sheet.cells[below[0], : len(table.names)].tolist()
+    numbers = [_count_numbers(sheet.cells[row]) for row in below[1:]]
+    of_step = is_step and numbers[0] > _count_numbers(units)
+    if of_step or (any(numbers) and all(map(in_brackets, filter(None, units)))):
+        return replace(table, units=units, units_at=below[0], first=below[0] + 1)
+    return None
+
+
+def _with_header_rows(sheet: Sheet, table: Table, columns: MeasurementBlock) -> Table:
+    """Return a table with its columns' units, and its first row below all rows of its header.
+
+    Rows below the names that hold no number where numbers are read are of the header, and so are
+    units right above them. The row that has most units has the units.
+    """
+    read = {key: table.indices(name)[0] for key, name in columns.named.items()}
+    below = _header_rows(sheet, table, columns, read)
+    units_in = {row: _count_units(sheet.cells[row], columns, read) for row in below}
+    for row in range(table.at - 1, max(table.at - _MOST_HEADER_ROWS, 0) - 1, -1):
+        if (count := _count_units(sheet.cells[row], columns, read)) > 1:
+            units_in[row] = count
+    units_at = max(units_in, key=lambda row: units_in[row], default=None)
+    if units_at is not None and not units_in[units_at]:
+        # Of no unit that is known: what is in brackets, or below the names of a step.
+        likely = (row for row in below if all(map(in_brackets, filter(None, sheet.cells[row]))))
+        units_at = next(likely, below[0] if table.is_step else None)
+    units = None if units_at is None else sheet.cells[units_at, : len(table.names)].tolist()
+    first = max(below, default=table.at) + 1
+    return replace(table, units=units, units_at=units_at, first=first)
+
+
+def _header_rows(
+    sheet: Sheet, table: Table, columns: MeasurementBlock, read: Mapping[str, int]
+) -> list[int]:
+    """Return places of rows below the names that are no row of numbers, at most five.
+
+    Names that come again below other rows, or an empty line, are those of another table.
+    """
+    rows: list[int] = []
+    only_names = True
+    for row in range(table.at + 1, min(table.at + 1 + _MOST_HEADER_ROWS, len(sheet.cells))):
+        cells = sheet.cells[row]
+        has_names = replace(table, names=cells.tolist()).common(columns) == len(columns.named)
+        again = only_names and sheet.numbers[row] == sheet.numbers[row - 1] + 1
+        if (has_names and not again) or any(cells[len(table.names) :]):
+            break
+        if not _is_of_header(cells, columns, read):
+            break
+        only_names = has_names
+        rows.append(row)
+    return rows
+
+
+def _is_of_header(cells: Sequence[str], columns: MeasurementBlock, read: Mapping[str, int]) -> bool:
+    """Return True if cells hold no number where numbers are read, and are no row with gaps."""
+    in_columns = [cells[index] for index in read.values()]
+    if unit_in_cell(cells[read[columns.axis]], columns.units_of(columns.axis)):
+        return True
+    if any(_NUMERIC.fullmatch(cell) or _FAILED_FORMULA.match(cell) for cell in in_columns):
+        return False
+    words = any(cell.lower() not in _GAPS for cell in in_columns)
+    return words or all(map(in_brackets, filter(None, cells)))
+
+
+def _count_units(cells: Sequence[str], columns: MeasurementBlock, read: Mapping[str, int]) -> int:
+    """Count the columns to read of which a row has a unit that they may have."""
+    pairs = ((cells[index], columns.units_of(key)) for key, index in read.items())
+    return sum(unit_in_cell(cell, units) is not None for cell, units in pairs if cell)
 
 
 def _likely_table(sheet: Sheet) -> Table:
@@ -391,7 +480,7 @@ def _likely_table(sheet: Sheet) -> Table:
     numbers = [*map(_count_numbers, sheet.cells[:_LINES_SEARCHED])]
     pairs = enumerate(pairwise(numbers))
     at = next((at for at, (here, below) in pairs if below > here == 0), 0)
-    return Table(at, sheet.cells[at, : sheet.widths[at]].tolist(), None, at + 1, end=at + 1)
+    return Table(at, sheet.cells[at, : sheet.widths[at]].tolist(), at + 1, end=at + 1)
 
 
 def _end(sheet: Sheet, table: Table, following: Table) -> int:

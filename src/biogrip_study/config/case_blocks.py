@@ -23,11 +23,11 @@ from biogrip.physics.gripper import Gripper
 from biogrip.physics.noise import MOST_SAMPLES
 from biogrip_study.config.published import Published
 from biogrip_study.gripper.calibration import CalibrationTest
-from biogrip_study.methods.registry import METHODS, SETTINGS
+from biogrip_study.methods.registry import METHODS
 
 CALIBRATED = "calibrated"
 
-_MOST_SAMPLES = 10_000_000
+_MOST_SAMPLES_OF_TRACE = 10_000_000
 
 _AnyGripper = Annotated[
     Annotated[dict[str, Any], Tag("a block of keys")] | Annotated[str, Tag("text")], BY_KIND
@@ -61,7 +61,8 @@ def _of_methods() -> type[Block]:
         needed = [key for key in fields(kind) if key.default is key.default_factory is MISSING]
         return field() if needed else field(default_factory=kind)
 
-    blocks = [(name, kind, default(kind)) for name, kind in SETTINGS.items()]
+    kinds = {method.key: method.settings for method in METHODS.values()}
+    blocks = [(name, kind, default(kind)) for name, kind in kinds.items()]
     return make_dataclass("_MethodBlocks", blocks, bases=(Block,), frozen=True, kw_only=True)
 
 
@@ -87,9 +88,8 @@ class Shared(_MethodBlocks, ExperimentBlocks):
     identifiability: Identifiability
 
     def method(self, name: str) -> Any:
-        """Return the settings of a method, of several blocks as a tuple."""
-        blocks = tuple(getattr(self, key) for key in METHODS[name].settings)
-        return blocks if len(blocks) > 1 else blocks[0]
+        """Return the settings of a method."""
+        return getattr(self, METHODS[name].key)
 
 
 OVERRIDABLE = tuple(block.name for block in fields(Shared))
@@ -121,11 +121,6 @@ class CaseBlock(Shared, SampleBlocks):
         yield from self._instrument_complaints()
         if self.sample.sample.model.power_law and not self.recorded:
             yield from self._band_complaints()
-        # A chromosome has the digits and the exponent of every parameter.
-        ranges = [getattr(self.search_range, p.range_name) for p in self.searched]
-        genes = sum(each.digits + 1 for each in ranges)
-        genetic = self.method("genetic")
-        yield from below(("genetic_algorithm",), genetic.complaints_of(genes))
         if self.assumed_gripper == CALIBRATED:
             arms = self.gripper.left, self.gripper.right
             yield from below(("calibration",), self.calibration.complaints_of(arms))
@@ -187,8 +182,8 @@ class CaseBlock(Shared, SampleBlocks):
         measured = self.measurement
         samples = self.protocol.end_s * measured.rate_Hz + 1
         needed = len(self.searched) + sum(measured.along.values()) + 1
-        most = MOST_SAMPLES if measured.coloured else _MOST_SAMPLES
+        most = MOST_SAMPLES if measured.coloured else _MOST_SAMPLES_OF_TRACE
         if not needed <= samples <= most:
-            found = f"found {measured.rate_Hz:g}, which gives {counted(f'{samples:.6g}', 'sample')}"
+            said = f"found {measured.rate_Hz:g}, which gives {counted(f'{samples:.6g}', 'sample')}"
             how = " with a coloured noise model" if measured.coloured else ""
-            yield ("rate_Hz",), f"{found} over the protocol; allowed are {needed} to {most}{how}."
+            yield ("rate_Hz",), f"{said} over the protocol; allowed are {needed} to {most}{how}."

@@ -10,7 +10,7 @@ from biogrip.keys import Block, OneOf
 from biogrip.physics.sample_model import SINGLE_BRANCH
 
 _Parameter = Annotated[str, OneOf(tuple(parameter.name for parameter in SINGLE_BRANCH))]
-_Signed = Annotated[
+_PrintedError = Annotated[
     str,
     Field(
         pattern=r"^[<>]?[+-]?[0-9]{1,6}(\.[0-9]{1,3})?$",
@@ -38,7 +38,7 @@ class Published(Block):
     """Ends of the rotation axis of the paper's figure."""
     identified: Mapping[_Parameter, Annotated[float, Field(ge=0, le=1e12)]]
     """Identified parameters as printed, SI units."""
-    error_percent: Mapping[_Parameter, _Signed]
+    error_percent: Mapping[_Parameter, _PrintedError]
     """Their errors in percent as printed, in quotes, for some are no numbers."""
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from biogrip.files import software as versions_and_digest
+from biogrip.files import software
 
 # The wheel contains a copy of these files of the repository.
 _PACKAGE = Path(__file__).parents[1]
@@ -26,6 +26,6 @@ def snakefile() -> Path:
     return shipped("Snakefile")
 
 
-def software() -> Mapping[str, str]:
+def study_software() -> Mapping[str, str]:
     """Return versions of what computes the study, and a digest of its source."""
-    return versions_and_digest(_PACKAGE)
+    return software(_PACKAGE)

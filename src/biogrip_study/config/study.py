@@ -75,13 +75,6 @@ class Case(SampleCase):
             return built(Gripper, overlaid(plain(self.gripper), assumed))
         return self.gripper
 
-    @property
-    def has_valley(self) -> bool:
-        """True if two exchangeable parameters are searched, and others besides."""
-        searched = [parameter.name for parameter in self.block.searched]
-        pair = {*self.sample.model.exchangeable} & {*searched}
-        return len(pair) == 2 and len(searched) > 2
-
 
 @dataclass(frozen=True)
 class Study:
@@ -218,7 +211,9 @@ def load_study(
     sources = [*map(read_source, files), *over]
     try:
         study = load(StudyConfig, config, sources, OVERRIDABLE)
-        study = replace(study, cases={it: study.cases[it] for it in study.only or study.cases})
+        study = replace(
+            study, cases={name: study.cases[name] for name in study.only or study.cases}
+        )
         refuse([*_point_complaints(study), *_reading_complaints(study)], sources, OVERRIDABLE)
     except BiogripError as error:
         text = f"The study's configuration cannot be used.\n{error}"
@@ -230,8 +225,8 @@ def _point_complaints(study: StudyConfig) -> Iterator[Complaint]:
     """Check every point of every sweep as if it were a case of the config."""
     blocks = point_blocks(study.sweeps, study.cases)
     for name, point in list_points(study.sweeps):
-        case, found = checked(CaseBlock, blocks[point.name])
-        for complaint in case.comb_complaints(study.actuator) if case else found:
+        case, complaints = checked(CaseBlock, blocks[point.name])
+        for complaint in case.comb_complaints(study.actuator) if case else complaints:
             yield from below(("sweeps", name), [study.sweeps[name].placed(point, complaint)])
 
 

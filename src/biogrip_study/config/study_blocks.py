@@ -15,7 +15,7 @@ from pydantic import BaseModel, Field, Tag
 
 from biogrip.config.design_blocks import DesignBlock
 from biogrip.config.source import overlaid
-from biogrip.config.trace_blocks import CandidateName, CaseName, ModelSelection
+from biogrip.config.trace_blocks import CandidateName, CaseName, CommonBlocks
 from biogrip.errors import nearest
 from biogrip.keys import (
     BY_KIND,
@@ -28,9 +28,9 @@ from biogrip.keys import (
     adapter,
     below,
     plain,
+    unknown_names,
 )
 from biogrip.physics.fractional import LONGEST_S
-from biogrip.physics.gripper import CombDrive
 from biogrip.physics.models import CANDIDATES
 from biogrip_study.config.case_blocks import OVERRIDABLE, CaseBlock, Shared
 from biogrip_study.methods.registry import METHODS
@@ -56,7 +56,7 @@ class ValueBlock(BaseModel):
 
 
 _Keys = Distinct[Annotated[tuple[str, ...], Field(min_length=1, max_length=100)]]
-_Value = Annotated[_Number | _Text | Annotated[ValueBlock, Tag("a block of keys")], BY_KIND]
+_AxisValue = Annotated[_Number | _Text | Annotated[ValueBlock, Tag("a block of keys")], BY_KIND]
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class AxisBlock(Block):
     key: Annotated[Annotated[str, Tag("text")] | Annotated[_Keys, Tag("a list")], BY_KIND]
     """Dotted key, or list of keys that change together, in any block that a case may change, e.g.
     `measurement.noise.level`."""
-    values: Distinct[Annotated[tuple[_Value, ...], Field(min_length=1, max_length=16)]]
+    values: Distinct[Annotated[tuple[_AxisValue, ...], Field(min_length=1, max_length=16)]]
     """Values of the key; or blocks to merge into the block of the key, each with a `label` of its
     own."""
     unit: Printed | None = None
@@ -185,17 +185,17 @@ def point_blocks(
     sweeps: Mapping[str, SweepBlock], cases: Mapping[str, CaseBlock]
 ) -> dict[str, dict[str, Any]]:
     """Return the config block of every point's case by name, as plain data, for checked sweeps."""
-    found = {}
+    by_name = {}
     blocks = {name: plain(case) for name, case in cases.items()} if sweeps else {}
     for _, point in list_points(sweeps):
-        found[point.name] = blocks[point.case]
+        by_name[point.name] = blocks[point.case]
         for key, value in (point.row.overrides | point.column.overrides).items():
             # A key that counts takes no 8.0.
             changed: Any = int(value) if isinstance(value, float) and value.is_integer() else value
             for name in reversed(key.split(".")):
                 changed = {name: changed}
-            found[point.name] = overlaid(found[point.name], changed)
-    return found
+            by_name[point.name] = overlaid(by_name[point.name], changed)
+    return by_name
 
 
 def _word(value: float | str) -> str:
@@ -204,9 +204,7 @@ def _word(value: float | str) -> str:
 
 
 _MOST_CASES = 2000
-# Most names listed in a message.
-_SHOWN = 6
-_Name = Annotated[
+_SweepName = Annotated[
     str,
     Field(
         pattern="^[A-Za-z][A-Za-z0-9_]{0,31}$",
@@ -236,6 +234,10 @@ class ReadingBlock(Block):
     """Name in print."""
     changes: Mapping[str, Any]
     """Merged into each case, with keys of a case, e.g. `genetic_algorithm: {patience: 60}`."""
+    runs: Annotated[int, Field(ge=1, le=100)] = 1
+    """Number of runs on a trace, the best of which is shown."""
+    polished: bool = False
+    """A local fit follows the algorithm."""
 
 
 @dataclass(frozen=True)
@@ -254,12 +256,9 @@ class TracesBlock(Block):
 
 
 @dataclass(frozen=True, kw_only=True)
-class StudyConfig(Shared):
+class StudyConfig(CommonBlocks, Shared):
     """All keys of a study's config."""
 
-    study_seed: Annotated[int, Field(ge=0, le=2**64 - 1)]
-    """The one seed of the study. Noise and genetic algorithm draw from streams derived from it, the
-    case's name and the seed's number."""
     seeds: Annotated[int, Field(ge=1, le=1_000_000)]
     """Number of noisy traces of each case that are made and identified. Raising it keeps the
     batches that are full."""
@@ -268,14 +267,11 @@ class StudyConfig(Shared):
     start-up."""
     pdf: bool = False
     """Whether figures are also written as PDF. Changes no result."""
-    actuator: CombDrive
-    """The rotary comb drive (Table 2)."""
     methods: Distinct[
         Annotated[tuple[Annotated[str, OneOf(METHODS)], ...], Field(min_length=1, max_length=100)]
     ]
     """Identification methods applied to every trace. Tables 5-7 and figures of single fits show the
     first."""
-    model_selection: ModelSelection
     evaluation: Evaluation
     reconstructed: Annotated[tuple[str, ...], Field(max_length=1000)]
     """Keys, or whole blocks, whose values the paper does not give. Tables mark them."""
@@ -295,14 +291,14 @@ class StudyConfig(Shared):
     """Names of the cases to run; the others are left out. By default all under `cases`."""
     design: DesignBlock = field(default_factory=DesignBlock)
     sweeps: Annotated[
-        Mapping[_Name, SweepBlock],
+        Mapping[_SweepName, SweepBlock],
         Field(
-            description=f"Grids of cases for heat maps, by name, of at most {MOST_POINTS} points "
-            "together. Every point is a case that differs in two values; it is identified like "
-            "others, and shown in heat maps and their table only."
+            description=f"Grids of cases, by name, of at most {MOST_POINTS} points together. Every "
+            "point is a case that differs in two values; it is identified like others, and shown "
+            "in the sweep's table only."
         ),
     ] = field(default_factory=dict)
-    readings: Annotated[Mapping[_Name, ReadingBlock], Field(max_length=100)] = field(
+    readings: Annotated[Mapping[_SweepName, ReadingBlock], Field(max_length=100)] = field(
         default_factory=dict
     )
     """Interpretations of the paper's text, by name, each tried with the genetic algorithm on the
@@ -312,14 +308,30 @@ class StudyConfig(Shared):
         """Find too many jobs, samples that do not fit, and names of nothing that there is."""
         if not self.cases:
             yield ("cases",), "found none, allowed is one or more."
+        yield from self._model_complaints()
+        for name, case in self.cases.items():
+            yield from below(("cases", name), case.comb_complaints(self.actuator))
+        yield from self._reconstructed_complaints()
+        chosen = [name for name in self.cases if name in (self.only or self.cases)]
+        yield from self._point_complaints(chosen)
+        searched = [p.name for case in self.cases.values() for p in case.searched]
+        asked = self.design.parameters
+        yield from unknown_names(("design", "parameters"), asked, dict.fromkeys(searched))
+        yield from unknown_names(("only",), self.only, self.cases)
+        for title, sweep in self.sweeps.items():
+            yield from unknown_names(("sweeps", title, "cases"), sweep.cases, chosen)
+
+    def _model_complaints(self) -> Iterator[Complaint]:
+        """Find models that are only valid for shorter protocols."""
         simulated = (case for case in self.cases.values() if not case.recorded)
         longest = max((case.protocol.end_s for case in simulated), default=0.0)
         for index, name in enumerate(self.model_selection.models):
             if CANDIDATES[name].model.power_law and longest > LONGEST_S:
                 text = f"found {name} and a protocol of {longest:g} s, allowed are at most"
                 yield ("model_selection", "models", index), f"{text} {LONGEST_S:g} s with it."
-        for name, case in self.cases.items():
-            yield from below(("cases", name), case.comb_complaints(self.actuator))
+
+    def _reconstructed_complaints(self) -> Iterator[Complaint]:
+        """Find names of no key."""
         known = adapter(StudyConfig).dump_python([self])[0] if self.reconstructed else {}
         for index, key in enumerate(self.reconstructed):
             block: Any = known
@@ -327,8 +339,10 @@ class StudyConfig(Shared):
                 block = block.get(part) if isinstance(block, Mapping) else None
             if block is None:
                 yield ("reconstructed", index), f"found '{key}', allowed is a key of this study."
-        chosen = [name for name in self.cases if name in (self.only or self.cases)]
-        points, taken = [*list_points(self.sweeps)], {*chosen}
+
+    def _point_complaints(self, cases: Iterable[str]) -> Iterator[Complaint]:
+        """Find too many points of sweeps, and such as have the name of another or of a case."""
+        points, taken = [*list_points(self.sweeps)], {*cases}
         if len(points) > MOST_POINTS:
             yield ("sweeps",), f"found {len(points)} points, allowed are {MOST_POINTS} together."
         for sweep, point in points:
@@ -336,14 +350,3 @@ class StudyConfig(Shared):
                 text = f"has the point {point.name}, a name that there is already"
                 yield ("sweeps", sweep), f"{text}; allowed is another."
             taken.add(point.name)
-        searched = [p.name for case in self.cases.values() for p in case.searched]
-        lists: dict[tuple[str, ...], tuple[Iterable[str], Iterable[str]]] = {
-            ("design", "parameters"): (self.design.parameters, dict.fromkeys(searched)),
-            ("only",): (self.only, self.cases),
-            **{("sweeps", name, "cases"): (s.cases, chosen) for name, s in self.sweeps.items()},
-        }
-        for path, (found, allowed) in lists.items():
-            for index, name in enumerate(found):
-                if name not in allowed:
-                    text = f"found '{name}', allowed are {', '.join([*allowed][:_SHOWN])}."
-                    yield (*path, index), text + nearest(name, allowed)

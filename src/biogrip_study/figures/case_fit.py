@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 
 from biogrip.arrays import Array
 from biogrip.figures import style
-from biogrip.figures.fit import Fit, draw_fit, fit_of, scale_of
+from biogrip.figures.fit import FittedTrace, draw_fit, fit_of, scale_of
+from biogrip.figures.likelihood import draw_profiles_of
 from biogrip.fit.experiment import Experiment
 from biogrip_study.config.study import Case
 from biogrip_study.gripper.simulation import jaw_force
@@ -19,29 +20,29 @@ from biogrip_study.records.identifications import ALL, basins, read_identificati
 from biogrip_study.records.rows import seeds_of
 from biogrip_study.records.traces import Measurements, read_measurements, read_target
 from biogrip_study.stages.identification import experiment_for
-from biogrip_study.stages.judgement import TRACE
+from biogrip_study.stages.judgement import JUDGED_SEED
 
 SHOWN_SEEDS = 100
 """Most seeds drawn individually; figures show the first ones."""
 
 
-def first_of_basins(found: pd.DataFrame, case: Case) -> dict[str, pd.Series]:
+def first_of_basins(identified: pd.DataFrame, case: Case) -> dict[str, pd.Series]:
     """Return the first run of each of the `basins`, by what it is called in a legend."""
-    if len(found) == 1:
-        return {"the only trace": found.iloc[0]}
+    if len(identified) == 1:
+        return {"the only trace": identified.iloc[0]}
     return {
         f"seed {runs['seed'].iloc[0]}" + f", {name}" * (name != ALL): runs.iloc[0]
-        for name, runs in basins(found, case.study.near_noise_tolerance).items()
+        for name, runs in basins(identified, case.study.near_noise_tolerance).items()
     }
 
 
 def fits_of_basins(
     case: Case, identifications: Path, measurements: list[Path], calibrated: list[Path]
-) -> dict[str, Fit]:
+) -> dict[str, FittedTrace]:
     """Return the fit of the first run of each basin, by label, from files of a case."""
-    found = read_identifications(identifications, case, case.study.shown_method.name)
+    identified = read_identifications(identifications, case, case.study.shown_method.name)
     fits = {}
-    for words, run in first_of_basins(found, case).items():
+    for words, run in first_of_basins(identified, case).items():
         seed = int(run["seed"])
         values = {p.name: float(run[p.column]) for p in case.sample.model.parameters}
         holding = next(path for path in measurements if seed in seeds_of(path.stem))
@@ -53,13 +54,13 @@ def fits_of_basins(
 
 def _fit_of_seed(
     problem: Experiment, parameters: Mapping[str, float], made: Measurements, seed: int
-) -> Fit:
+) -> FittedTrace:
     return fit_of(problem, parameters, made.time_s, made.readings[seed], made.sd, made.target)
 
 
-def first_seeds(found: pd.DataFrame) -> pd.DataFrame:
+def first_seeds(identified: pd.DataFrame) -> pd.DataFrame:
     """Return the identifications of seeds that are drawn individually."""
-    return found[found["seed"] < SHOWN_SEEDS]
+    return identified[identified["seed"] < SHOWN_SEEDS]
 
 
 def seeds_in_words(count: int) -> str:
@@ -82,18 +83,24 @@ def draw_judged_fit(
 ) -> Figure:
     """Draw the judged trace of a case and its best fit."""
     fit = judged_fit(case, read_verdicts(verdicts), measurements[0], calibrated)
-    trace = "recorded trace" if case.recorded else f"seed {TRACE}"
+    trace = "recorded trace" if case.recorded else f"seed {JUDGED_SEED}"
     return draw_fit({f"best fit ({trace})": fit}, case.title, case.published.axis_rad)
+
+
+def draw_profiles(case: Case, verdicts: Path, expected: list[Path]) -> Figure:
+    """Draw the profile of every quantity of a case, with confidence limits."""
+    others = [read_verdicts(path) for path in expected]
+    return draw_profiles_of(read_verdicts(verdicts), others, case.title, case.parameters)
 
 
 def judged_fit(
     case: Case, verdicts: Mapping[str, Any], measurements: Path, calibrated: list[Path]
-) -> Fit:
+) -> FittedTrace:
     """Return the judged trace of a case and its best fit."""
-    recorded = read_measurements(measurements, [TRACE])
+    recorded = read_measurements(measurements, [JUDGED_SEED])
     experiment = experiment_for(case.experiment, recorded, calibrated)
-    found = {item["quantity"]: item["value"] for item in verdicts["quantities"]}
-    return _fit_of_seed(experiment, found, recorded, TRACE)
+    values = {item["quantity"]: item["value"] for item in verdicts["quantities"]}
+    return _fit_of_seed(experiment, values, recorded, JUDGED_SEED)
 
 
 def draw_force(case: Case, target: Path) -> Figure:
@@ -141,8 +148,8 @@ def draw_force(case: Case, target: Path) -> Figure:
     return drawn
 
 
-def _from_loss(found: UnilateralResponse, values: Array) -> Array:
+def _from_loss(response: UnilateralResponse, values: Array) -> Array:
     """Return values from the last sample before contact is first lost, NaN before."""
-    lost = np.flatnonzero(~found.touching)
+    lost = np.flatnonzero(~response.touching)
     start = max(lost[0] - 1, 0) if len(lost) else len(values)
     return np.where(np.arange(len(values)) >= start, values, np.nan)

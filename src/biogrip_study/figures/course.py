@@ -10,7 +10,6 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patheffects import withStroke
 from matplotlib.ticker import LogLocator, MaxNLocator
 
 from biogrip.arrays import Array
@@ -39,8 +38,8 @@ _LOWEST = 1e-3
 
 
 def _line_of_seed(seed: object, first: Mapping[str, int], alpha: float) -> dict[str, Any]:
-    for own, color in zip(first.values(), style.RUNS, strict=False):
-        if seed == own:
+    for highlighted, color in zip(first.values(), style.RUNS, strict=False):
+        if seed == highlighted:
             return {"color": color, "linewidth": 1.5, "zorder": 3}
     return {"color": style.ALL_SEEDS, "linewidth": 0.4, "alpha": alpha}
 
@@ -60,34 +59,35 @@ def _runs(
     Histories are those of the seeds drawn individually and of these first ones.
     """
     method = case.study.shown_method.name
-    found = read_identifications(identifications, case, method)
-    runs = first_of_basins(found, case)
+    identified = read_identifications(identifications, case, method)
+    runs = first_of_basins(identified, case)
     first = {words: int(run["seed"]) for words, run in runs.items()}
     histories = read_histories(history, method, values)
     drawn = histories["seed"].isin({*range(SHOWN_SEEDS), *first.values()})
-    return found, first, histories[drawn]
+    return identified, first, histories[drawn]
 
 
 def draw_convergence(case: Case, identifications: Path, history: Path) -> Figure:
     """Draw each seed's excess of the misfit over its noise, highlighting a run of each basin."""
     method, tolerance = case.study.shown_method, case.study.near_noise_tolerance
-    found, first, histories = _runs(case, identifications, history, ["best_misfit"])
-    noise = found.set_index("seed")["noise_rms"]
+    identified, first, histories = _runs(case, identifications, history, ["best_misfit"])
+    noise = identified.set_index("seed")["noise_rms"]
     noisy = bool((noise > 0).all())
-    unit = noise if noisy else pd.Series(found["misfit"].min(), index=noise.index)
+    unit = noise if noisy else pd.Series(identified["misfit"].min(), index=noise.index)
     drawn = style.figure(style.COLUMN_IN, 2.9)
     axes = drawn.subplots()
     for seed, rows in histories.groupby("seed"):
         excess = 100 * (rows["best_misfit"] / unit[seed] - 1)
         axes.plot(rows["generation"], excess, **_line_of_seed(seed, first, 0.7))
-    _name_seeds(axes, len(found), first)
+    _name_seeds(axes, len(identified), first)
     label = "noise in the trace" if noisy else "lowest misfit"
     axes.axhline(0, color=style.TARGET, linestyle="--", linewidth=0.8, label=label)
     last = int(histories["generation"].max())
-    if "genetic_algorithm" in method.settings:
-        mutation_start = case.block.method("genetic").mutation_start
-        if mutation_start <= last:
-            _mark_mutation(axes, mutation_start, last)
+    start = case.block.method("genetic").mutation_start
+    if method.name == "genetic" and start <= last:
+        axes.axvline(
+            start, color=style.TARGET, linestyle=":", linewidth=0.8, label="mutation starts"
+        )
     axes.set_yscale("symlog", linthresh=1, linscale=0.5)
     axes.set_ylim(bottom=-0.8)
     ticks = [tick for tick in _TICKS if tick < axes.get_ylim()[1]]
@@ -98,32 +98,17 @@ def draw_convergence(case: Case, identifications: Path, history: Path) -> Figure
     if noisy:
         words, near = near_noise_words(tolerance), 100 * tolerance
         axes.axhline(near, color=style.TARGET, linestyle="-.", linewidth=0.8, label=words)
-        reached = near_noise(found, tolerance).sum()
-        axes.set_title(f"{case.title}: {reached} of {len(found)} {words}")
+        reached = near_noise(identified, tolerance).sum()
+        axes.set_title(f"{case.title}: {reached} of {len(identified)} {words}")
     drawn.legend(loc="outside lower center", ncols=2)
     return drawn
-
-
-def _mark_mutation(axes: Axes, start: int, last: int) -> None:
-    axes.axvline(start, color=style.TARGET, linestyle=":", linewidth=0.8)
-    before = start > last / 2
-    axes.annotate(
-        "mutation starts",
-        (start, 0.03),
-        xycoords=("data", "axes fraction"),
-        xytext=(-3 if before else 3, 0),
-        textcoords="offset points",
-        ha="right" if before else "left",
-        fontsize=7,
-        path_effects=[withStroke(linewidth=2, foreground="white")],
-    )
 
 
 def draw_evolution(case: Case, identifications: Path, history: Path) -> Figure:
     """Draw every parameter over generations for all seeds, highlighting a run of each basin."""
     parameters, identified = case.sample.model.parameters, case.published.identified
     columns = [parameter.column for parameter in parameters]
-    found, first, histories = _runs(case, identifications, history, columns)
+    identified_runs, first, histories = _runs(case, identifications, history, columns)
     down = -(-len(parameters) // 2)
     drawn = style.figure(style.COLUMN_IN, 1.2 + 1.5 * down)
     grid = drawn.subplots(down, 2, sharex=True).ravel()
@@ -145,7 +130,7 @@ def draw_evolution(case: Case, identifications: Path, history: Path) -> Figure:
     for axes in grid[len(parameters) - 2 : len(parameters)]:
         axes.set_xlabel(case.study.shown_method.step)
         axes.tick_params(labelbottom=True)
-    _name_seeds(grid[0], len(found), first)
+    _name_seeds(grid[0], len(identified_runs), first)
     if case.parameters:
         grid[0].plot([], [], color=style.TARGET, linestyle="--", label="target")
     if identified:
@@ -157,22 +142,22 @@ def draw_evolution(case: Case, identifications: Path, history: Path) -> Figure:
 
 def draw_waterfall(case: Case, identifications: Path) -> Figure:
     """Draw sorted increases of chi-squared, of every method's runs and of best encodable points."""
-    found = read_identifications(identifications, case)
-    increase = np.maximum(chi_square_increase(found, case), _LOWEST)
-    reached = reached_encodable(found, case)
+    identified = read_identifications(identifications, case)
+    increase = np.maximum(chi_square_increase(identified, case), _LOWEST)
+    reached = reached_encodable(identified, case)
     drawn = style.figure(style.COLUMN_IN, 3.5)
     axes = drawn.subplots()
-    methods = found["method"].unique()
+    methods = identified["method"].unique()
     # Where curves coincide each is seen beside the thinner ones on top of it.
     for name, width in zip(methods, np.linspace(3.2, 1.0, len(methods)), strict=True):
         method = METHODS[name]
-        runs = found["method"] == name
+        runs = identified["method"] == name
         mine = np.sort(increase[runs])
         place = 100 * (np.arange(len(mine)) + 0.5) / len(mine)
         label = f"{method.title}: {share_in_words(int(reached[runs].sum()), len(mine))}"
         look = {"color": style.COLORS[method.color], "linewidth": width}
         axes.plot(place, mine, label=label, linestyle=method.dashes, **look)
-    least = np.sort(chi_square_increase(found, case, ENCODABLE)[runs]).clip(_LOWEST)
+    least = np.sort(chi_square_increase(identified, case, ENCODABLE)[runs]).clip(_LOWEST)
     axes.plot(place, least, "--", color=style.TARGET, linewidth=0.8, label="best encodable point")
     axes.set(yscale="log", ylim=(_LOWEST / 2, 5 * float(increase.max())))
     ticks = [tick for tick in 10.0 ** np.arange(-3, 7) if tick < axes.get_ylim()[1]]
@@ -198,8 +183,8 @@ def draw_scatter(
     case: Case, identifications: Path, target: Path, expected: Path, calibrated: list[Path]
 ) -> Figure:
     """Draw identified over target for every quantity and method."""
-    verdicts = {it["quantity"]: it["verdict"] for it in read_verdicts(expected)["quantities"]}
-    found = read_identifications(identifications, case)
+    verdicts = {item["quantity"]: item["verdict"] for item in read_verdicts(expected)["quantities"]}
+    identified = read_identifications(identifications, case)
     bounds = bounds_at_truth(case, target, calibrated)
     drawn, grid = style.row_of_panels(len(bounds), 3.1)
     for index, (axes, (quantity, limit)) in enumerate(zip(grid, bounds, strict=True)):
@@ -208,12 +193,12 @@ def draw_scatter(
         if value == 0:
             axes.axis("off")
             continue
-        ratios = found[[p.column for p in names]].sum(axis=1) / value
+        ratios = identified[[p.column for p in names]].sum(axis=1) / value
         verdict = verdicts[quantity.label]
         # The bound is a tangent at the truth: no use if the quantity is not determined, or if it
         # is zero.
         known = limit if limit and verdict == DETERMINED else np.inf
-        _quantity(axes, case, found["method"], ratios.to_numpy(float), known)
+        _quantity(axes, case, identified["method"], ratios.to_numpy(float), known)
         if {p.name for p in names} <= {*(printed := case.published.identified)}:
             ratio = np.clip(sum(printed[p.name] for p in names) / value, *axes.get_ylim())
             axes.axhline(ratio, color=style.PAPER, linewidth=1.2, linestyle=(0, (4, 2)))
@@ -221,7 +206,7 @@ def draw_scatter(
         style.panel(axes, ascii_letters[index], f"{quantity.symbol}: {said}", 60)
         if index == 0:
             axes.set_ylabel("identified / target")
-    _legend(drawn, case, list(found["method"].unique()), found["seed"].nunique())
+    _legend(drawn, case, list(identified["method"].unique()), identified["seed"].nunique())
     return drawn
 
 

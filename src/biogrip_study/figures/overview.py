@@ -1,17 +1,11 @@
-"""Figures of a study: fits and identifications about the truth, moduli, its answer at a glance.
+"""Figures of a study: fits and identifications about the truth, moduli, its answer at a glance."""
 
-Of a sweep, heat maps of the share of seeds in the true basin, and of their errors over the bound.
-"""
-
-import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
@@ -24,7 +18,6 @@ from biogrip.judging.verdicts import BOUNDED_ABOVE
 from biogrip.physics.noise import standard_deviation
 from biogrip.physics.sample_model import Network, SampleModel, complex_modulus
 from biogrip_study.config.study import Case, Study
-from biogrip_study.config.study_blocks import SweepBlock
 from biogrip_study.figures.case_fit import (
     SHOWN_SEEDS,
     first_seeds,
@@ -32,7 +25,6 @@ from biogrip_study.figures.case_fit import (
     judged_fit,
     seeds_in_words,
 )
-from biogrip_study.methods.registry import METHODS
 from biogrip_study.records.identifications import (
     near_noise,
     near_noise_words,
@@ -40,20 +32,13 @@ from biogrip_study.records.identifications import (
     read_verdicts,
 )
 from biogrip_study.records.traces import read_target
-from biogrip_study.tables.sweeps import axis_title, headlines_of, read_points
 
 # Ends of the axes of identified over target values, of parameters in decades and of sums.
 _WORST, _SUM = 1e3, 0.1
 _TITLE_LETTERS = 19
-_MOST_CASES = 3
 _DOTS: dict[str, Any] = {
     "linestyle": "", "marker": "o", "markersize": 2.2, "markeredgewidth": 0, "alpha": 0.55
 }  # fmt: skip
-
-
-def shown_cases(study: Study) -> list[str]:
-    """Return names of the first simulated cases, as many as fit."""
-    return study.simulated[:_MOST_CASES]
 
 
 def draw_overview(
@@ -76,14 +61,14 @@ def draw_overview(
     style.panel(axes[0], "a", cases[0].title)
     files = zip(axes[1:], cases, identifications, expected, strict=True)
     for index, (scatter, case, path, judged) in enumerate(files):
-        found = read_identifications(path, case, study.shown_method.name)
+        identified = read_identifications(path, case, study.shown_method.name)
         quantities = read_verdicts(judged)["quantities"]
-        bounded = {it["quantity"] for it in quantities if it["verdict"] != BOUNDED_ABOVE}
-        _scatter(scatter, case, first_seeds(found), bounded)
+        bounded = {item["quantity"] for item in quantities if item["verdict"] != BOUNDED_ABOVE}
+        _draw_ratios(scatter, case, first_seeds(identified), bounded)
         scatter.set_yticks([1e-3, 1e-2, 0.1, 1, 10, 100, 1e3], [""] * 7 if index else None)
         style.panel(scatter, "bcd"[index], case.title, most_letters=_TITLE_LETTERS)
     axes[1].set_ylabel("identified / target")
-    pairs = (zip(*it.get_legend_handles_labels(), strict=True) for it in axes[1:])
+    pairs = (zip(*item.get_legend_handles_labels(), strict=True) for item in axes[1:])
     legend = {label: handle for pair in pairs for handle, label in pair}
     drawn.legend(
         legend.values(),
@@ -91,13 +76,13 @@ def draw_overview(
         loc="outside lower right",
         ncols=5,
         markerscale=2.5,
-        title=seeds_in_words(len(found)) if len(found) > SHOWN_SEEDS else None,
+        title=seeds_in_words(len(identified)) if len(identified) > SHOWN_SEEDS else None,
     )
     return drawn
 
 
-def _scatter(axes: Axes, case: Case, found: pd.DataFrame, bounded: set[str]) -> None:
-    reached = near_noise(found, tolerance := case.study.near_noise_tolerance)
+def _draw_ratios(axes: Axes, case: Case, fits: pd.DataFrame, bounded: set[str]) -> None:
+    reached = near_noise(fits, tolerance := case.study.near_noise_tolerance)
     identified = case.published.identified
     ticks: list[str] = []
     # Sums are told so much better that on an axis of decades they are a line.
@@ -110,10 +95,10 @@ def _scatter(axes: Axes, case: Case, found: pd.DataFrame, bounded: set[str]) -> 
             continue
         x = len(ticks)
         ticks.append("+".join(parameter.symbol for parameter in group))
-        ratio = found[[parameter.column for parameter in group]].sum(axis=1).to_numpy(float)
+        ratio = fits[[parameter.column for parameter in group]].sum(axis=1).to_numpy(float)
         place = x + 0.5 * ((np.arange(len(ratio)) * 0.618034) % 1 - 0.5)
         points = np.column_stack([place, ratio / target])
-        own, ends = (
+        target_axes, ends = (
             (axes, (1 / _WORST, _WORST)) if len(group) == 1 else (sums, (1 - _SUM, 1 + _SUM))
         )
         for which, color, label in (
@@ -122,11 +107,13 @@ def _scatter(axes: Axes, case: Case, found: pd.DataFrame, bounded: set[str]) -> 
         ):
             look, labels = _DOTS | {"color": color}, (label, "")
             low, high = ((sign * np.inf, end) for sign, end in zip((-1, 1), ends, strict=True))
-            style.points_within(own, points[which], low, high, look, edge_size=3.5, labels=labels)
+            style.points_within(
+                target_axes, points[which], low, high, look, edge_size=3.5, labels=labels
+            )
         if set(names) <= set(identified):
             paper = sum(identified[name] for name in names) / target
             shown = float(np.clip(paper, *ends))
-            own.plot([x - 0.4, x + 0.4], [shown, shown], color=style.PAPER, label="paper")
+            target_axes.plot([x - 0.4, x + 0.4], [shown, shown], color=style.PAPER, label="paper")
     axes.axhline(1, color=style.TARGET, linewidth=0.8, label="truth")
     axes.set_yscale("log")
     axes.plot([], [], "^", color=style.TARGET, markersize=1.6, label="beyond the axis")
@@ -138,26 +125,27 @@ def _scatter(axes: Axes, case: Case, found: pd.DataFrame, bounded: set[str]) -> 
         axes.axvline(len(ticks) - 1.5, color=style.TARGET, linewidth=0.5)
 
 
-def draw_answer(case: Case, verdicts: Path, measurements: Path, calibrated: list[Path]) -> Figure:
-    """Draw a gripper, the judged trace of a case, and what it tells of two exchangeable dampers."""
-    found = read_verdicts(verdicts)
-    items = {item["quantity"]: item for item in found["quantities"]}
+def draw_answer(study: Study, verdicts: Path, measurements: Path, calibrated: list[Path]) -> Figure:
+    """Draw a gripper, the judged trace of the only case, and what it tells of two dampers."""
+    (case,) = study.cases.values()
+    judged = read_verdicts(verdicts)
+    items = {item["quantity"]: item for item in judged["quantities"]}
     drawn = style.figure(style.COLUMN_IN, 3.4)
     (device, trace), profiles = drawn.subplots(2, 2)
     _device(device)
     style.panel(device, "1", "two arms squeeze")
-    fit = judged_fit(case, found, measurements, calibrated)
+    fit = judged_fit(case, judged, measurements, calibrated)
     factor, unit = draw_traces(trace, {"fit": fit})
     trace.set_ylim(top=1.45 * factor * fit.measured.max())
     trace.set(xlabel="time (s)", ylabel=with_unit("rotation", unit))
     handles, _ = trace.get_legend_handles_labels()
     trace.legend(handles[::2], ["trace", "fit"], loc="upper right", ncols=2, columnspacing=1)
     style.panel(trace, "2", "one of them turns")
-    names = [found["valley"][axis]["name"] for axis in "xy"]
+    names = [name for name in case.sample.model.names if name in case.sample.model.exchangeable]
     for number, axes, name in zip("34", profiles, (" + ".join(names), names[1]), strict=True):
         draw_profile(axes, items[name])
-        axes.axhline(found["threshold"], color=style.BLACK, linestyle="--", linewidth=0.7)
-        place = (0.02, found["threshold"] + 0.2, f"{100 * found['confidence']:g} %")
+        axes.axhline(judged["threshold"], color=style.BLACK, linestyle="--", linewidth=0.7)
+        place = (0.02, judged["threshold"] + 0.2, f"{100 * judged['confidence']:g} %")
         axes.text(*place, transform=axes.get_yaxis_transform(), fontsize=7)
         style.panel(axes, number, f"{items[name]['symbol']}: {items[name]['verdict']}")
     profiles[0].set_ylabel("rise of χ²")
@@ -179,7 +167,7 @@ def _device(axes: Axes) -> None:
 NEAR = 0.1
 """Relative spread of nine tenths of the fits below which the experiment determines a modulus."""
 
-_POINTS = 121
+_MODULI_DRAWN = 121
 _PANEL_LETTERS = 28
 _STYLES: tuple[dict[str, Any], ...] = (
     *({"color": colour} for colour in (style.BLUE, style.ORANGE, style.GREEN)),
@@ -202,7 +190,7 @@ def draw_moduli(study: Study, identifications: list[Path], targets: list[Path]) 
         sigma = standard_deviation(rotation, case.noise)
         # Without noise there is nothing to compare with: NaN.
         relative = sensitivity / np.where(sigma > 0, sigma, np.nan)
-        _moduli(axes[0, column], study, case, identified, time_s)
+        _draw_moduli_of_case(axes[0, column], study, case, identified, time_s)
         _sensitivities(axes[1, column], case.experiment.searched, time_s, relative)
         style.panel(axes[0, column], "abc"[column], case.title, _PANEL_LETTERS)
         style.panel(axes[1, column], "def"[column], "when each parameter shows", _PANEL_LETTERS)
@@ -217,18 +205,20 @@ def draw_moduli(study: Study, identifications: list[Path], targets: list[Path]) 
     return drawn
 
 
-def _moduli(axes: Axes, study: Study, case: Case, identified: Path, time_s: Array) -> None:
+def _draw_moduli_of_case(
+    axes: Axes, study: Study, case: Case, identified: Path, time_s: Array
+) -> None:
     """Draw G' and G'' of all fits and of the truth, and shade where the fits agree."""
     between = np.diff(time_s)
     slowest, fastest = 1 / (time_s[-1] - time_s[0]), 1 / float(np.min(between))
-    omega = np.geomspace(slowest / 30, 30 * fastest, _POINTS)
+    omega = np.geomspace(slowest / 30, 30 * fastest, _MODULI_DRAWN)
     model = case.experiment.model
     near = []
     for method in {m.name: m for m in (study.shown_method, study.fitting_method)}.values():
-        found = first_seeds(read_identifications(identified, case, method.name))
-        fits = found[[p.column for p in model.parameters]].to_numpy(float)
+        runs = first_seeds(read_identifications(identified, case, method.name))
+        fits = runs[[p.column for p in model.parameters]].to_numpy(float)
         moduli = _modulus(model.network(fits), omega)
-        near.append(moduli[near_noise(found, study.near_noise_tolerance)])
+        near.append(moduli[near_noise(runs, study.near_noise_tolerance)])
         color = style.COLORS[method.color]
         look: dict[str, Any] = {"color": color, "linewidth": 0.4, "alpha": 0.45}
         for index, modulus in enumerate(moduli):
@@ -278,110 +268,3 @@ def _modulus(network: Network, omega: Array) -> Array:
     """Return complex moduli of n samples, in N/m or Pa, (n, n_omega)."""
     storage, loss = complex_modulus(network, omega)
     return storage + 1j * loss
-
-
-_CELL_IN = 0.24
-_TALLEST_IN = 2.4
-# Smallest cell that holds two lines of text.
-_LEGIBLE_IN = (0.26, 0.2)
-_SHARE = Normalize(0, 100)
-_RATIO = LogNorm(0.5, 100)
-_RATIO_TICKS = (0.5, 1, 2, 5, 10, 20, 50, 100)
-_WITHOUT_BOUND = "#dddddd"
-
-
-def save_robustness(study: Study, sweep: str, points: Path, figure: list[Path]) -> None:
-    """Draw a sweep, see `draw_robustness`, and write the figure."""
-    with style.styled():
-        style.save(draw_robustness(study, sweep, points), *figure)
-
-
-def draw_robustness(study: Study, name: str, points: Path) -> Figure:
-    """Draw shares in the true basin, and errors of the best and the worst determined quantity.
-
-    Numbers in cells are for the first method; brackets hold the share of the second method, and
-    the bound.
-    """
-    sweep, methods = study.config.sweeps[name], study.config.methods
-    cases = list(sweep.cases)[:_MOST_CASES]
-    rows = len(sweep.rows.levels)
-    height = min(max(_CELL_IN * rows, 0.9), _TALLEST_IN)
-    drawn = style.figure(style.PAGE_IN, 3 * (height + 0.25) + 0.9)
-    grid = drawn.subplots(3, len(cases), squeeze=False, sharex=True, sharey=True)
-    for index, case in enumerate(cases):
-        found = read_points(points, name, case)
-        style.panel(grid[0, index], "abc"[index], study.cases[case].title, most_letters=24)
-        first, *others = (found[found["method"] == method] for method in methods[:2])
-        shares = [100 * _grid(sweep, each, "basin_share") for each in (first, *others)]
-        _heat_map(grid[0, index], sweep, shares[0], _SHARE, "cividis")
-        _write(grid[0, index], shares, _SHARE(shares[0]), "cividis", height / rows)
-        chosen = headlines_of(found)
-        for axes, quantity in zip(grid[1:, index], chosen, strict=False):
-            symbol = re.sub(r"_(\w+)", r"_{\1}", quantity)
-            axes.set_title(f"${symbol}$: error there (bound) in %", fontsize=7.5)
-            own = first[first["quantity"] == quantity]
-            error, bound = (_grid(sweep, own, f"{it}_percent") for it in ("basin_error", "bound"))
-            # Clip, since an error of zero has no logarithm.
-            ratio = np.clip(error / bound, _RATIO.vmin, _RATIO.vmax)
-            _heat_map(axes, sweep, ratio, _RATIO, "cividis_r")
-            _write(axes, [error, bound], _RATIO(ratio), "cividis_r", height / rows)
-        for axes in grid[1 + len(chosen) :, index]:
-            axes.set_axis_off()
-            words = "nothing else is determined\nat half of the points"
-            axes.text(0.5, 0.5, words, ha="center", transform=axes.transAxes)
-    drawn.supylabel(axis_title(study, sweep.rows), fontsize=8)
-    drawn.supxlabel(axis_title(study, sweep.columns), fontsize=8)
-    title, *titles = (METHODS[method].title for method in methods)
-    bar = drawn.colorbar(ScalarMappable(_SHARE, "cividis"), ax=list(grid[0]), pad=0.01)
-    lines = ["seeds in the true basin (%)", title, *(f"({other})" for other in titles[:1])]
-    bar.set_label("\n".join(lines), fontsize=7)
-    bar = drawn.colorbar(
-        ScalarMappable(_RATIO, "cividis_r"), ax=list(grid[1:].flat), pad=0.01, extend="both"
-    )
-    bar.set_ticks(_RATIO_TICKS, labels=[f"{tick:g}" for tick in _RATIO_TICKS])
-    bar.set_label(f"median error there / bound\n{title}", fontsize=7)
-    drawn.suptitle(sweep.title or name, fontsize=8, x=0.01, ha="left")
-    return drawn
-
-
-def _grid(sweep: SweepBlock, points: pd.DataFrame, column: str) -> Array:
-    wide = points.pivot_table(index="row", columns="column", values=column, dropna=False)
-    rows, columns = ([level.shown for level in axis.levels] for axis in (sweep.rows, sweep.columns))
-    return wide.reindex(index=rows, columns=columns).to_numpy(float)
-
-
-def _heat_map(axes: Axes, sweep: SweepBlock, values: Array, norm: Normalize, colours: str) -> None:
-    axes.set_facecolor(_WITHOUT_BOUND)
-    axes.pcolormesh(values, norm=norm, cmap=colours, edgecolors="white", linewidth=0.5)
-    for axis, set_ticks in ((sweep.rows, axes.set_yticks), (sweep.columns, axes.set_xticks)):
-        shown = [level.shown.replace(", ", ",\n") for level in axis.levels]
-        set_ticks(np.arange(len(shown)) + 0.5, shown)
-    axes.tick_params(length=0, labelsize=6.5)
-    for spine in axes.spines.values():
-        spine.set_visible(False)
-
-
-def _write(axes: Axes, numbers: list[Array], colour: Array, colours: str, height_in: float) -> None:
-    """Write a number into every cell, and a second one in brackets below it."""
-    columns = numbers[0].shape[1]
-    if style.PAGE_IN / (_MOST_CASES + 1) / columns < _LEGIBLE_IN[0] or height_in < _LEGIBLE_IN[1]:
-        return
-    dark = colours == "cividis"
-    for (row, column), share in np.ndenumerate(colour):
-        light = share < 0.5 if dark else share > 0.5
-        texts = [_short(float(grid[row, column])) for grid in numbers]
-        lines = [texts[0], *(f"({text})" for text in texts[1:] if text)]
-        color = "white" if light and np.isfinite(share) else "black"
-        look: dict[str, Any] = {"color": color, "fontsize": 5.5, "linespacing": 0.95}
-        place = column + 0.5, row + 0.5
-        axes.text(*place, "\n".join(lines), ha="center", va="center", **look)
-
-
-def _short(number: float) -> str:
-    if not np.isfinite(number):
-        return ""
-    if 0 < number < 0.01:
-        return "<0.01"
-    if number >= 10_000:
-        return f"{number:.0e}".replace("e+0", "e")
-    return f"{number:.0f}" if number >= 10 else f"{number:.{1 if number < 0.1 else 2}g}"

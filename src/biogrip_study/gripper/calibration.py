@@ -159,24 +159,24 @@ def calibrate(record: FreeMotion, step_Nm: float, impulse_Nms: float) -> Calibra
     # In the second fit, each record is weighted by its own noise.
     for _ in range(2):
         weights = 1 / scale[:, None]
-        found = least_squares(
+        fit = least_squares(
             lambda x, weights=weights: (weights * differences(x)).ravel(), logarithms, method="lm"
         )
-        if not found.success or not np.all(np.isfinite(found.x)):
+        if not fit.success or not np.all(np.isfinite(fit.x)):
             raise BiogripError("calibration: no arm fits the records; is the rate high enough?")
-        logarithms = found.x
+        logarithms = fit.x
         scale = np.maximum(differences(logarithms).std(axis=1), 1e-12 * np.ptp(measured, axis=1))
-    variance = np.linalg.inv(found.jac.T @ found.jac) * (2 * found.cost / (len(found.fun) - 3))
-    values = np.exp(found.x)
+    variance = np.linalg.inv(fit.jac.T @ fit.jac) * (2 * fit.cost / (len(fit.fun) - 3))
+    values = np.exp(fit.x)
     return CalibratedArm(Arm(*values), Arm(*(values * np.sqrt(np.diag(variance)))))
 
 
 def _first_guess(record: FreeMotion, step_Nm: float) -> Array:
     """Estimate stiffness from the step's end, frequency from the spectrum, damping from decay."""
     if len(record.time_s) < _FEWEST_SAMPLES_OF_RECORD:
-        found = f"found {counted(len(record.time_s), 'sample')}"
+        samples = f"found {counted(len(record.time_s), 'sample')}"
         raise BiogripError(
-            f"calibration: {found}, allowed are {_FEWEST_SAMPLES_OF_RECORD} or more."
+            f"calibration: {samples}, allowed are {_FEWEST_SAMPLES_OF_RECORD} or more."
         )
     tail = len(record.time_s) // 4
     stiffness = step_Nm / np.mean(record.step[-tail:])

@@ -63,8 +63,8 @@ class Correction:
 
     def at(self, time_s: Array, arm: int = LEFT) -> Array:
         """Evaluate nonlinear minus linear rotation in rad at ascending times, (n, n_times)."""
-        own = self.values[:, min(arm, self.values.shape[1] - 1)]
-        return self._interpolated(own, time_s)
+        of_arm = self.values[:, min(arm, self.values.shape[1] - 1)]
+        return self._interpolated(of_arm, time_s)
 
     def force_at(self, time_s: Array) -> Array:
         """Evaluate nonlinear minus linear jaw force in N at ascending times, (n, n_times)."""
@@ -81,8 +81,12 @@ class Correction:
         functions = _polynomials(points, (time_s - starts) / lengths)
         functions[:, time_s < edges_s[0]] = 0.0
         on_elements = enumerate(np.split(functions, cuts, axis=1))
-        found = [values[:, e] @ np.ascontiguousarray(own) for e, own in on_elements if own.size]
-        return np.concatenate(found, axis=1)
+        pieces = [
+            values[:, e] @ np.ascontiguousarray(weights)
+            for e, weights in on_elements
+            if weights.size
+        ]
+        return np.concatenate(pieces, axis=1)
 
 
 def nonlinear_rotation(
@@ -92,9 +96,9 @@ def nonlinear_rotation(
 
     A torque that closes the arms beyond what the model describes is a `BiogripError`.
     """
-    found = correction(gripper, network, torque).checked()
+    beyond_linear = correction(gripper, network, torque).checked()
     linear = step_response(gripper, network)
-    return superpose(linear, torque, time_s, arm) + found.at(time_s, arm)
+    return superpose(linear, torque, time_s, arm) + beyond_linear.at(time_s, arm)
 
 
 def correction(
@@ -118,7 +122,7 @@ def correction(
     tau = evaluate(torque, before_jumps).reshape(nodes.shape)
     times = np.ones(shape[0]) if factors is None else factors
     linear, linear_rate, tau = (
-        times[:, None, None, None] * each for each in (linear, linear_rate, tau)
+        times[:, None, None, None] * values for values in (linear, linear_rate, tau)
     )
     peak = np.abs(linear).max(axis=(1, 2, 3))
     extra, extra_rate, loads = np.zeros(shape), np.zeros(shape), np.zeros(shape)
@@ -131,9 +135,9 @@ def correction(
         loads[left] = load = b_0 * _load_of(gripper, arms, tau[left], u, u_rate)
         # That of both arms, and what that of the left one exceeds that of the right one by.
         load[:, 1:] = load[:, :1] - load[:, 1:]
-        found, extra_rate[left] = modes.respond(load, left)
-        change = np.abs(found - extra[left]).max(axis=(1, 2, 3))
-        extra[left] = found
+        new_extra, extra_rate[left] = modes.respond(load, left)
+        change = np.abs(new_extra - extra[left]).max(axis=(1, 2, 3))
+        extra[left] = new_extra
         converged[left] = change <= _LARGEST_CHANGE * peak[left]
         left = left[~converged[left] & np.isfinite(change)]
         if not len(left):

@@ -19,14 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from biogrip.arrays import Array, IntArray
-from biogrip.digits import counted
+from biogrip.arrays import IntArray
 from biogrip.fit.problem import Fit, History, HistoryRow, ReportProgress, TraceProblem, silent
 from biogrip.keys import Block, Complaint
 from biogrip_study.methods.genome import Chromosomes, Genome, make_genome
 from biogrip_study.methods.misfit import make_misfits
 
-_MOST = 1_000_000
+_LARGEST_SETTING = 1_000_000
 
 Ranking = NDArray[np.float32]
 """Misfits by which individuals are ranked, (n_populations, n)."""
@@ -36,29 +35,27 @@ Ranking = NDArray[np.float32]
 class GeneticSettings(Block):
     """Settings of the genetic algorithm (section 4)."""
 
-    population: Annotated[int, Field(ge=4, le=_MOST)]
+    population: Annotated[int, Field(ge=4, le=_LARGEST_SETTING)]
     """Individuals in a generation."""
-    survivors: Annotated[int, Field(ge=2, le=_MOST)]
+    survivors: Annotated[int, Field(ge=2, le=_LARGEST_SETTING)]
     """Number of the best, which survive unchanged and are the parents of the others."""
     mating: Literal["pairs", "rank"]
     """`pairs`: survivors form random disjoint pairs; `rank`: parents are drawn with a probability
     proportional to their rank."""
-    first_cut: Annotated[int, Field(ge=1, le=50)]
-    """Smallest number of genes that a child takes from its first parent."""
-    last_cut: Annotated[int, Field(ge=-50, le=50)]
-    """Largest number of genes that a child takes from its first parent. Negative numbers count from
-    the end; -1 is one less than the chromosome has, 11 with twelve genes."""
-    mutation_start: Annotated[int, Field(ge=1, le=_MOST)]
+    cut: Literal["once", "between", "each"]
+    """`once`: one crossover cut, anywhere; `between`: one, between parameters; `each`: one in every
+    parameter."""
+    mutation_start: Annotated[int, Field(ge=1, le=_LARGEST_SETTING)]
     """First generation whose children mutate."""
     mutation_probability: Annotated[float, Field(ge=0, le=1)]
     """Share of the children that mutate."""
     mutated_genes: Annotated[int, Field(ge=1, le=50)]
     """Number of times that a gene of such a child is chosen and redrawn from its range."""
-    patience: Annotated[int, Field(ge=1, le=_MOST)]
+    patience: Annotated[int, Field(ge=1, le=_LARGEST_SETTING)]
     """Stop after this number of generations without improvement of the best misfit."""
-    min_generations: Annotated[int, Field(ge=0, le=_MOST)]
+    min_generations: Annotated[int, Field(ge=0, le=_LARGEST_SETTING)]
     """Fewest generations."""
-    max_generations: Annotated[int, Field(ge=1, le=_MOST)]
+    max_generations: Annotated[int, Field(ge=1, le=_LARGEST_SETTING)]
     """Most generations."""
     mutants: Literal["children", "all"] = "children"
     """Individuals that may mutate: `children`; or `all`, survivors except the best, too."""
@@ -72,13 +69,6 @@ class GeneticSettings(Block):
             text = f"found {self.min_generations}, allowed is at most max_generations"
             yield ("min_generations",), f"{text}, which is {self.max_generations}."
 
-    def complaints_of(self, genes: int) -> Iterator[Complaint]:
-        """Find crossover cuts that a chromosome of `genes` genes cannot have."""
-        last = self.last_cut if self.last_cut > 0 else genes + self.last_cut
-        if genes and not 1 <= self.first_cut <= last:
-            text = f"found {self.first_cut}, allowed is 1 to last_cut, "
-            yield ("first_cut",), f"{text}which is {last} of {counted(genes, 'gene')} here."
-
 
 def identify_many(
     problems: Sequence[TraceProblem],
@@ -87,19 +77,6 @@ def identify_many(
     progress: ReportProgress = silent,
 ) -> list[Fit]:
     """Identify samples of one model by the paper's genetic algorithm, all at once."""
-    return [found for found, _, _ in evolve(problems, settings, rngs, progress)]
-
-
-def evolve(
-    problems: Sequence[TraceProblem],
-    settings: GeneticSettings,
-    rngs: Sequence[np.random.Generator],
-    progress: ReportProgress = silent,
-) -> list[tuple[Fit, Array, Array]]:
-    """Identify samples as `identify_many` does; return the first and last survivors as well.
-
-    They are parameters, best first, (n_survivors, n_parameters).
-    """
     misfits = make_misfits([problem.residuals for problem in problems])
     genome = make_genome(problems[0].ranges)
 
@@ -120,7 +97,6 @@ def evolve(
     # In single bytes, which sorting and crossover copy in half of the time.
     everyone: Chromosomes = np.stack(drawn).astype(np.int8)
     survivors, ranking = select(everyone, ranked(everyone, running), genome, settings.survivors)
-    first, last = survivors, survivors.copy()
     improved, stalled = np.zeros_like(running), np.zeros(len(rngs), dtype=bool)
     courses: list[list[HistoryRow]] = [[] for _ in rngs]
     evaluations = settings.population
@@ -130,17 +106,16 @@ def evolve(
         waited = generation - 1 - improved[running] >= settings.patience
         if generation > settings.min_generations and waited.any():
             stalled[running[waited]] = True
-            last[running] = survivors
             running, survivors, ranking = running[~waited], survivors[~waited], ranking[~waited]
             if not len(running):
                 break
-        own_rngs = [rngs[population] for population in running.tolist()]
-        children, before = cross(survivors, settings, own_rngs), ranking[:, 0]
+        rngs_running = [rngs[population] for population in running.tolist()]
+        children, before = cross(survivors, genome, settings, rngs_running), ranking[:, 0]
         if generation >= settings.mutation_start:
-            mutate(children, genome, settings, own_rngs)
+            mutate(children, genome, settings, rngs_running)
             if settings.mutants == "all":
                 others = survivors[:, 1:].copy()
-                mutate(others, genome, settings, own_rngs)
+                mutate(others, genome, settings, rngs_running)
                 children = np.concatenate((children, others), axis=1)
                 survivors, ranking = survivors[:, :1], ranking[:, :1]
         everyone = np.concatenate((survivors, children), axis=1)
@@ -151,14 +126,13 @@ def evolve(
         evaluations_of_all += children.shape[1] * len(running)
         record()
         progress(evaluations_of_all, float(ranking[:, 0].min()))
-    last[running] = survivors
-    found = []
+    fits = []
     for course, has_stalled in zip(courses, stalled.tolist(), strict=True):
         parameters, misfit, _, evaluations = course[-1]
         why = "stalled" if has_stalled else "generation limit"
         steps, history = len(course) - 1, History.of(course)
-        found.append(Fit(parameters, misfit, steps, evaluations, why, history))
-    return list(zip(found, genome.decode(first), genome.decode(last), strict=True))
+        fits.append(Fit(parameters, misfit, steps, evaluations, why, history))
+    return fits
 
 
 def select(
@@ -182,23 +156,21 @@ def _taken(individuals: NDArray[Any], which: IntArray) -> NDArray[Any]:
 
 
 def cross(
-    parents: Chromosomes, settings: GeneticSettings, rngs: Sequence[np.random.Generator]
+    parents: Chromosomes,
+    genome: Genome,
+    settings: GeneticSettings,
+    rngs: Sequence[np.random.Generator],
 ) -> Chromosomes:
     """Produce both children of pairs of parents, (n_populations, n, n_genes), best first."""
     populations, count, genes = parents.shape
     n_children = settings.population - settings.survivors
     pairs = -(-n_children // 2)
-    first, last = (
-        min(cut if cut > 0 else genes + cut, genes - 1)
-        for cut in (settings.first_cut, settings.last_cut)
-    )
     mates = np.empty((populations, pairs, 2), dtype=np.int64)
-    cuts = np.empty((populations, pairs, 1), dtype=np.int64)
+    head = np.empty((populations, pairs, genes), dtype=bool)
     for row, rng in enumerate(rngs):
         mates[row] = _mates(count, pairs, settings, rng)
-        cuts[row, :, 0] = rng.integers(min(first, last), last, size=pairs, endpoint=True)
+        head[row] = np.arange(genes) < _cuts(pairs, genome, settings, rng)
     mothers, fathers = (_taken(parents, mates[:, :, parent]) for parent in (0, 1))
-    head = np.arange(genes) < cuts
     children = np.where(head, mothers, fathers), np.where(head, fathers, mothers)
     return np.concatenate(children, axis=1)[:, :n_children]
 
@@ -215,6 +187,20 @@ def _mates(
     return np.concatenate(rounds)[: 2 * pairs].reshape(pairs, 2)
 
 
+def _cuts(
+    pairs: int, genome: Genome, settings: GeneticSettings, rng: np.random.Generator
+) -> IntArray:
+    """Draw where genes of the first parent end, (pairs, 1), or in each parameter, (pairs, n)."""
+    ends = np.cumsum(genome.sizes)
+    if settings.cut == "each":
+        within = rng.integers(0, genome.sizes, size=(pairs, len(ends)), endpoint=True)
+        return np.repeat(ends - genome.sizes + within, genome.sizes, axis=1)
+    if settings.cut == "between" and len(ends) > 1:
+        return rng.choice(ends[:-1], size=(pairs, 1))
+    last = genome.genes - 1
+    return rng.integers(min(1, last), last, size=(pairs, 1), endpoint=True)
+
+
 def mutate(
     chromosomes: Chromosomes,
     genome: Genome,
@@ -222,9 +208,9 @@ def mutate(
     rngs: Sequence[np.random.Generator],
 ) -> None:
     """Mutate individuals, (n_populations, n, n_genes), in place: redraw genes of some of them."""
-    for own, rng in zip(chromosomes, rngs, strict=True):
-        mutating = np.flatnonzero(rng.random(len(own)) < settings.mutation_probability)
+    for population, rng in zip(chromosomes, rngs, strict=True):
+        mutating = np.flatnonzero(rng.random(len(population)) < settings.mutation_probability)
         for _ in range(settings.mutated_genes):
             gene = rng.integers(genome.genes, size=len(mutating))
             low, high = genome.low[gene], genome.high[gene]
-            own[mutating, gene] = rng.integers(low, high, endpoint=True)
+            population[mutating, gene] = rng.integers(low, high, endpoint=True)

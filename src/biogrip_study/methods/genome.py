@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import product
 from typing import Any
 
@@ -25,8 +25,10 @@ class Genome:
     high: IntArray
     """Largest one, included, (n_genes,)."""
     sizes: tuple[int, ...]
-    """Number of genes of each parameter, (n_parameters,): its exponent and digits, in this
-    order."""
+    """Number of genes of each parameter, (n_parameters,): its exponent and digits, in this order,
+    or its bits."""
+    binary: tuple[tuple[int, GeneRange], ...] = ()
+    """Index and range of each parameter that has bits."""
 
     @property
     def genes(self) -> int:
@@ -47,8 +49,12 @@ class Genome:
         digits = np.array(self.sizes) - 1
         powers = chromosomes[..., self._exponents] - digits + _LARGEST_POWER
         parameters: Array = chromosomes @ self._places
-        parameters *= _TIMES.take(powers)
-        parameters /= _OVER.take(powers)
+        parameters *= _TIMES_POWER.take(powers)
+        parameters /= _OVER_POWER.take(powers)
+        for parameter, genes in self.binary:
+            first = self._exponents[parameter]
+            bits = chromosomes[..., first : first + genes.bits]
+            parameters[..., parameter] = _of_bits(genes, bits)
         return parameters
 
     def keys(self, chromosomes: Chromosomes) -> list[Array]:
@@ -89,25 +95,34 @@ class Genome:
 # The largest power of ten that is an exact double.
 _LARGEST_POWER = 22
 _POWERS = range(-_LARGEST_POWER, _LARGEST_POWER + 1)
-_TIMES = np.array([10.0 ** max(power, 0) for power in _POWERS])
-_OVER = np.array([10.0 ** max(-power, 0) for power in _POWERS])
+_TIMES_POWER = np.array([10.0 ** max(power, 0) for power in _POWERS])
+_OVER_POWER = np.array([10.0 ** max(-power, 0) for power in _POWERS])
 
 
 def make_genome(ranges: Sequence[GeneRange]) -> Genome:
     """Return the genome of parameters, from the gene range of each."""
-    low = np.concatenate([genes.least for genes in ranges])
-    high = np.concatenate([genes.most for genes in ranges])
-    return Genome(low, high, tuple(genes.digits + 1 for genes in ranges))
+    low, high = (np.concatenate(ends) for ends in zip(*(g.bounds for g in ranges), strict=True))
+    sizes = tuple(len(genes.bounds[0]) for genes in ranges)
+    return Genome(low, high, sizes, tuple((i, g) for i, g in enumerate(ranges) if g.bits))
 
 
+@cache
 def encodable_values(genes: GeneRange) -> Array:
     """Return all positive values that genes can encode, ascending, each the nearest double."""
+    if genes.bits:
+        return np.geomspace(genes.low, genes.high, 2**genes.bits)
     mantissas = np.zeros(1)
     for least, most in zip(genes.least[1:], genes.most[1:], strict=True):
         mantissas = (10 * mantissas[:, None] + np.arange(least, most + 1)).ravel()
     powers = np.arange(genes.exponent[0], genes.exponent[1] + 1) - genes.digits + _LARGEST_POWER
-    values: Array = mantissas * _TIMES[powers, None] / _OVER[powers, None]
+    values: Array = mantissas * _TIMES_POWER[powers, None] / _OVER_POWER[powers, None]
     return np.unique(values[values > 0]) if genes.least[1] == 0 else values.ravel()
+
+
+def _of_bits(genes: GeneRange, bits: Chromosomes) -> Array:
+    """Decode bits, (..., n_bits), the largest first, into a value each."""
+    plain = np.bitwise_xor.accumulate(bits, axis=-1) if genes.gray else bits
+    return encodable_values(genes)[plain @ (1 << np.arange(genes.bits)[::-1])]
 
 
 def nearest_encodable(value: float, genes: GeneRange) -> float:
@@ -117,9 +132,9 @@ def nearest_encodable(value: float, genes: GeneRange) -> float:
 
 
 # Least relative decrease of the misfit that counts, so that all processors take the same steps.
-_LEAST = 1e-7
+_LEAST_DECREASE = 1e-7
 # Parameters changed at once: with three a search follows a valley.
-_AT_ONCE = 3
+_CHANGED_AT_ONCE = 3
 
 
 def lowest_encodable(
@@ -135,17 +150,19 @@ def lowest_encodable(
     tens = [genes.most[-1] - genes.least[-1] + 1 for genes in ranges]
     every = product(*((-ten, -1, 0, 1, ten) for ten in tens))
     steps = np.array(sorted(every, key=np.count_nonzero))
-    steps = steps[np.count_nonzero(steps, axis=1) <= _AT_ONCE]
+    steps = steps[np.count_nonzero(steps, axis=1) <= _CHANGED_AT_ONCE]
     columns = zip(values, starts.T, strict=True)
-    places = np.stack([abs(own - start[:, None]).argmin(axis=1) for own, start in columns], axis=1)
+    places = np.stack(
+        [abs(encodable - start[:, None]).argmin(axis=1) for encodable, start in columns], axis=1
+    )
     lowest = np.inf
     while len(places):
         around = np.unique(places, axis=0)[:, None] + steps
-        np.clip(around, 0, [len(own) - 1 for own in values], out=around)
+        np.clip(around, 0, [len(encodable) - 1 for encodable in values], out=around)
         columns = zip(values, around.reshape(-1, len(values)).T, strict=True)
-        found = misfit(np.stack([own[at] for own, at in columns], axis=1))
-        found = found.reshape(around.shape[:2])
-        best = np.arange(len(around)), found.argmin(axis=1)
-        places = around[best][found[best] < (1 - _LEAST) * found[:, 0]]
-        lowest = min(lowest, float(found.min()))
+        misfits = misfit(np.stack([encodable[at] for encodable, at in columns], axis=1))
+        misfits = misfits.reshape(around.shape[:2])
+        best = np.arange(len(around)), misfits.argmin(axis=1)
+        places = around[best][misfits[best] < (1 - _LEAST_DECREASE) * misfits[:, 0]]
+        lowest = min(lowest, float(misfits.min()))
     return lowest

@@ -46,14 +46,14 @@ def make_misfits(residuals: Sequence[Residuals]) -> Misfits:
     the paper's: of a sample with one Maxwell branch between equal arms under steps of a torque,
     sampled uniformly from the start on, with a reading at each step, in white noise alone.
     """
-    alike = len({each.of_responses for each in residuals}) == 1
+    alike = len({of_trace.of_responses for of_trace in residuals}) == 1
     if alike and (series := _series_of(residuals)):
         return series.of_each
-    misfits = [make_misfit(each) for each in residuals]
+    misfits = [make_misfit(of_trace) for of_trace in residuals]
 
     def one_by_one(parameters: Array, traces: IntArray) -> Array:
         pairs = zip(parameters, traces, strict=True)
-        return np.stack([misfits[trace](own) for own, trace in pairs])
+        return np.stack([misfits[trace](population) for population, trace in pairs])
 
     return one_by_one
 
@@ -73,7 +73,7 @@ def _series_of(every: Sequence[Residuals]) -> "SeriesMisfit | None":
         and residuals.model.network([residuals.model.example]).k.shape[1] == 1
     ):
         given = residuals.gripper, residuals.model, course, end_s / intervals
-        return SeriesMisfit(*given, np.stack([each.trace.readings for each in every]))
+        return SeriesMisfit(*given, np.stack([of_trace.trace.readings for of_trace in every]))
     return None
 
 

@@ -4,11 +4,11 @@ A module has the class of its settings, whose fields are the keys of its config 
 (`biogrip.keys`), and a function ``identify_many(problems, settings, rngs, progress)``, which
 returns a `Fit` of each trace, to the bit as if it were alone. Ranges and traces are the problems',
 the budget is in the settings, the generator of each trace is the only source of randomness, and
-progress is told of all. A method with several blocks is given a tuple of their settings. A history
-has a row for the start and one a step, of which there are `Fit.generations`.
+progress is told of all. A history has a row for the start and one a step, of which there are
+`Fit.generations`.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 
@@ -17,9 +17,7 @@ import numpy as np
 from biogrip.fit.least_squares import LeastSquaresSettings
 from biogrip.fit.problem import Fit, ReportProgress, TraceProblem
 from biogrip.keys import Block
-from biogrip_study.methods.differential_evolution import DifferentialEvolutionSettings
 from biogrip_study.methods.genetic import GeneticSettings
-from biogrip_study.methods.genetic_refined import Polishing
 
 
 @dataclass(frozen=True)
@@ -30,16 +28,16 @@ class Method:
     """Name in the config and in files."""
     title: str
     """Name in print."""
-    settings: Mapping[str, type[Block]]
-    """Classes of its config blocks, by their keys."""
+    key: str
+    """Key of its config block."""
+    settings: type[Block]
+    """Class of this block."""
     step: str
     """Name of a step of the method, after each of which its history has a row."""
     color: str
     """Colour of its lines in figures, its own, of `biogrip.figures.style.COLORS`."""
     dashes: str
     """Their dashes, as Matplotlib has them."""
-    sure: bool = False
-    """True if it finds the global optimum of (nearly) every trace; tests hold it to that."""
     package: str = __package__
     """Package of its module, which has the method's name."""
 
@@ -50,45 +48,24 @@ METHODS: dict[str, Method] = {
         Method(
             "genetic",
             "genetic algorithm",
-            {"genetic_algorithm": GeneticSettings},
+            key="genetic_algorithm",
+            settings=GeneticSettings,
             step="generation",
             color="grey",
             dashes="-",
         ),
         Method(
-            "genetic_refined",
-            "genetic, polished",
-            {"genetic_algorithm": GeneticSettings, "genetic_refined": Polishing},
-            step="generation, then local fit",
-            color="vermilion",
-            dashes="-",
-            sure=True,
-        ),
-        Method(
             "least_squares",
             "multi-start least squares",
-            {"least_squares": LeastSquaresSettings},
+            key="least_squares",
+            settings=LeastSquaresSettings,
             step="local fit",
             color="blue",
             dashes="--",
-            sure=True,
             package="biogrip.fit",
-        ),
-        Method(
-            "differential_evolution",
-            "differential evolution",
-            {"differential_evolution": DifferentialEvolutionSettings},
-            step="generation",
-            color="purple",
-            dashes="-.",
         ),
     )
 }
-
-SETTINGS: dict[str, type[Block]] = {
-    key: kind for method in METHODS.values() for key, kind in method.settings.items()
-}
-"""Classes of the config blocks of all methods, by their keys."""
 
 Identify = Callable[
     [Sequence[TraceProblem], Sequence[np.random.Generator], ReportProgress], list[Fit]
@@ -97,7 +74,7 @@ Identify = Callable[
 
 
 def identifier(name: str, settings: object) -> Identify:
-    """Load a method of `METHODS` with its settings, those of several blocks as a tuple."""
+    """Load a method of `METHODS` with its settings."""
     module = import_module(f"{METHODS[name].package}.{name}")
 
     def identify(

@@ -12,11 +12,11 @@ from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, N
 from biogrip.physics.models import CANDIDATES
 from biogrip_study.records.identifications import ALL, share_with_limits
 
-Row = Mapping[str, str]
+TableRow = Mapping[str, str]
 
 
 def say_what_the_study_gives(
-    methods: Iterable[Row], shown: str, titles: Mapping[str, str], who: str, tolerance: float
+    methods: Iterable[TableRow], shown: str, titles: Mapping[str, str], who: str, tolerance: float
 ) -> str:
     """Say in which share of each case's traces the study's own method finds what genes can encode.
 
@@ -29,7 +29,7 @@ def say_what_the_study_gives(
         return ""
     shares[0] = shares[0].replace("(", f"of {rows[0]['seeds']} runs (95 % interval: ", 1)
     fit = f"ends within {tolerance:g} of the lowest χ² known that its encoding of values allows"
-    return f"{who} {shown} {fit}, in {_listed(shares)}."
+    return f"{who} {shown} {fit}, in {_enumerated(shares)}."
 
 
 def say_what_recordings_tell(judged: Sequence[Mapping[str, Any]]) -> str:
@@ -39,30 +39,34 @@ def say_what_recordings_tell(judged: Sequence[Mapping[str, Any]]) -> str:
     """
     if not judged:
         return ""
-    every = [quantity for own in judged for quantity in own["quantities"]]
-    fits = Counter(own["fit"] for own in judged)
+    every = [quantity for verdicts in judged for quantity in verdicts["quantities"]]
+    fits = Counter(verdicts["fit"] for verdicts in judged)
     if len(judged) > 1:
-        counts = Counter(it["quantity"] for it in every if it["verdict"] == DETERMINED)
+        counts = Counter(q["quantity"] for q in every if q["verdict"] == DETERMINED)
         shares = [
-            f"{it} is determined in {counts[it]}"
-            for it in dict.fromkeys(q["quantity"] for q in every)
+            f"{name} is determined in {counts[name]}"
+            for name in dict.fromkeys(q["quantity"] for q in every)
         ]
-        told = f"Of {len(judged)} traces, {_listed(shares)}."
+        told = f"Of {len(judged)} traces, {_enumerated(shares)}."
     elif fits[REJECTED]:
         told = "The model cannot give this trace, so that the trace determines nothing."
     else:
         named = defaultdict[str, list[str]](list)
-        for it in every:
-            provided = f" (provided {it['provided']})" if it["provided"] else ""
-            named[it["verdict"]].append(it["quantity"] + provided)
-        said = [f"{words} {_listed(named[it])}" for it, words in _TOLD.items() if named[it]]
+        for q in every:
+            provided = f" (provided {q['provided']})" if q["provided"] else ""
+            named[q["verdict"]].append(q["quantity"] + provided)
+        said = [
+            f"{words} {_enumerated(named[verdict])}"
+            for verdict, words in _VERBS.items()
+            if named[verdict]
+        ]
         told = f"This trace {'; it '.join(said)}."
     unsure = [f"{fits[fit]} {fit}" for fit in (DOUBTFUL, REJECTED) if fits[fit]]
-    return told + (f" Of the fits, {_listed(unsure)}." if unsure else "")
+    return told + (f" Of the fits, {_enumerated(unsure)}." if unsure else "")
 
 
 def say_which_model_is_better(
-    models: Iterable[Row], case: str, candidate: str, fit: str = OK
+    models: Iterable[TableRow], case: str, candidate: str, fit: str = OK
 ) -> str:
     """Say which model BIC prefers in a case's trace to its own, one of `CANDIDATES`; "" if none.
 
@@ -71,17 +75,19 @@ def say_which_model_is_better(
     """
     names = {sample.model.title: name for name, sample in CANDIDATES.items()}
     tried = [
-        FittedModel(names[row["model"]], *(float(row[f"median_delta_{it}"]) for it in _CRITERIA))
+        FittedModel(
+            names[row["model"]], *(float(row[f"median_delta_{name}"]) for name in _CRITERIA)
+        )
         for row in models
         if row["case"] == case and row["model"] in names
     ]
     judge = fits_far_better if fit == REJECTED else preferred
-    known = any(each.candidate == candidate for each in tried)
+    known = any(model.candidate == candidate for model in tried)
     return advice(tried, candidate) if known and judge(tried, candidate) else ""
 
 
 _CRITERIA = "aic", "bic"
-_TOLD = {
+_VERBS = {
     DETERMINED: "determines",
     BOUNDED_BELOW: "bounds only below",
     BOUNDED_ABOVE: "bounds only above",
@@ -89,7 +95,7 @@ _TOLD = {
 }
 
 
-def say_what_traces_tell(coverage: Iterable[Row], titles: Mapping[str, str]) -> str:
+def say_what_traces_tell(coverage: Iterable[TableRow], titles: Mapping[str, str]) -> str:
     """Say of which quantities all, none, or what share of the traces are determined.
 
     Rows are those of the table of coverage; only verdicts from whole profiles count.
@@ -97,22 +103,24 @@ def say_what_traces_tell(coverage: Iterable[Row], titles: Mapping[str, str]) -> 
     shares: dict[str, list[tuple[str, int, int]]] = defaultdict(list)
     for row in coverage:
         if runs := int(row["shown_seeds"] or 0):
-            found = titles[row["case"]], int(row["shown_determined"]), runs
-            shares[row["quantity"]].append(found)
+            count = titles[row["case"]], int(row["shown_determined"]), runs
+            shares[row["quantity"]].append(count)
     if not shares:
         return ""
-    ends = {q: [share_with_limits(*of) for _, *of in each] for q, each in shares.items()}
-    always = [q for q, each in ends.items() if all(low >= 0.9 or at == 1 for at, low, _ in each)]
-    never = [q for q, each in ends.items() if all(high <= 0.1 or at == 0 for at, _, high in each)]
-    runs = max(runs for each in shares.values() for *_, runs in each)
+    ends = {q: [share_with_limits(*of) for _, *of in counts] for q, counts in shares.items()}
+    always = [q for q, of in ends.items() if all(low >= 0.9 or at == 1 for at, low, _ in of)]
+    never = [q for q, of in ends.items() if all(high <= 0.1 or at == 0 for at, _, high in of)]
+    runs = max(runs for counts in shares.values() for *_, runs in counts)
     all_of, none_of = (share_with_limits(count, runs) for count in (runs, 0))
 
     def determine(share: tuple[float, float, float], names: Sequence[str]) -> str:
         rounded = round(share[0], 2)
         if rounded == 0:
-            return f"{'hardly any' if share[0] else 'none'} determines {_listed(names)}"
+            return f"{'hardly any' if share[0] else 'none'} determines {_enumerated(names)}"
         nearly = "nearly " * (share[0] < 1)
-        return f"{nearly + 'all' if rounded == 1 else _percent(*share)} determine {_listed(names)}"
+        return (
+            f"{nearly + 'all' if rounded == 1 else _percent(*share)} determine {_enumerated(names)}"
+        )
 
     told = [f"Of {counted(runs, 'trace')} of each sample"]
     for names, worst in ((always, min), (never, max)):
@@ -128,7 +136,7 @@ def say_what_traces_tell(coverage: Iterable[Row], titles: Mapping[str, str]) -> 
         for (title, *_), limits in zip(shares[name], ends[name], strict=True):
             of_title[title][limits].append(name)
     said = [
-        f"On “{title}” {_listed([determine(*each) for each in by_share.items()])}."
+        f"On “{title}” {_enumerated([determine(*of_share) for of_share in by_share.items()])}."
         for title, by_share in of_title.items()
     ]
     if not first:
@@ -137,56 +145,36 @@ def say_what_traces_tell(coverage: Iterable[Row], titles: Mapping[str, str]) -> 
     return " ".join(filter(None, [first, *said, legible(f"(95 % intervals: {sure}.)")]))
 
 
-def say_which_method_finds_it(methods: Iterable[Row], shown: str) -> str:
+def say_which_method_finds_it(methods: Iterable[TableRow], shown: str) -> str:
     """Say how often the surest method reaches that, and what it takes beside the study's own.
 
     Parameters are those of `say_what_the_study_gives`.
     """
-    found: dict[str, list[Row]] = defaultdict(list)
+    by_method: dict[str, list[TableRow]] = defaultdict(list)
     for row in methods:
-        found[row["method"]].append(row)
-    if not found:
+        by_method[row["method"]].append(row)
+    if not by_method:
         return ""
 
     def worst(name: str) -> tuple[float, float]:
-        lowest = min(float(row["reached_share"]) for row in found[name])
-        return lowest, -max(float(row["median_evaluations"]) for row in found[name])
+        lowest = min(float(row["reached_share"]) for row in by_method[name])
+        return lowest, -max(float(row["median_evaluations"]) for row in by_method[name])
 
-    surest = max(found, key=worst)
-    least, *more = sorted(found[surest], key=lambda row: float(row["reached_share"]))
+    surest = max(by_method, key=worst)
+    least, *more = sorted(by_method[surest], key=lambda row: float(row["reached_share"]))
     at_least = "at least " * (more != [] and share_of(least) != share_of(more[-1]))
     said = (
         f"{surest[:1].upper()}{surest[1:]} comes as low, or lower, in {at_least}"
         f"{share_of(least)} of the runs on {'each' if more else 'the'} sample, with "
-        f"{_responses(found[surest])} simulated responses"
+        f"{_range_of_responses(by_method[surest])} simulated responses"
     )
-    if shown in found and shown != surest:
-        said += f"; the {shown} takes {_responses(found[shown])}"
+    if shown in by_method and shown != surest:
+        said += f"; the {shown} takes {_range_of_responses(by_method[shown])}"
     return f"{said}."
 
 
-def say_what_claims_are(claims: Iterable[Row]) -> str:
-    """Say how many of the paper's statements have each verdict; "" if there are none."""
-    counts = Counter(row["verdict"] for row in claims)
-    judged = {verdict: count for verdict, count in counts.items() if verdict not in UNJUDGED}
-    if not judged:
-        return ""
-    listed = [f"{counts[verdict]} {verdict}" for verdict in _CLAIMED if counts[verdict]]
-    others = f"; {counts[_ELSEWHERE]} more take another config" if counts[_ELSEWHERE] else ""
-    return (
-        f"Of the paper's claims, each counted once for every sample and quantity, "
-        f"{sum(judged.values())} are judged: {', '.join(listed)}{others}."
-    )
-
-
-_ELSEWHERE = "judged elsewhere"
-UNJUDGED = "not judged", _ELSEWHERE
-"""Verdicts of claims that do not count: nothing can contradict them, or another config judges."""
-_CLAIMED = "replicated", "in part", "not", "too few runs to tell", "cannot be told"
-
-
 def rows_beside_the_paper(
-    compared: Iterable[Row], titles: Mapping[str, str]
+    compared: Iterable[TableRow], titles: Mapping[str, str]
 ) -> list[dict[str, str]]:
     """Return the paper's Tables 5 to 7 beside the study's runs.
 
@@ -194,16 +182,16 @@ def rows_beside_the_paper(
     of that name.
     """
     rows = list(compared)
-    told = {row["quantity"] for row in rows if row["verdict"] != "cannot be told"}
+    told = {row["quantity"] for row in rows if row["verdict"] != "not identifiable"}
     return [
         {
             "sample": titles[row["case"]],
             "quantity": legible(with_unit(row["quantity"], row["unit"])),
-            "target": _number(row["target"]),
+            "target": _legible_number(row["target"]),
             "paper": _ends(row, "printed_from", "printed_to")
             + f" ({_ends(row, 'error_from_percent', 'error_to_percent', ' %', 3)})",
             "runs": f"{row['runs']}, {row['reading']}",
-            "error of a run": legible(f"{_number(row['median_error_percent'], 2)} %")
+            "error of a run": legible(f"{_legible_number(row['median_error_percent'], 2)} %")
             + f" ({_ends(row, 'median_from_percent', 'median_to_percent', ' %', 2)})",
             "runs near the paper's value": _percent(
                 *(float(row[f"near_{end}"]) for end in ("share", "from", "to"))
@@ -216,7 +204,7 @@ def rows_beside_the_paper(
 
 
 def compared_rows(
-    errors: Iterable[Row], verdicts: Iterable[Row], titles: Mapping[str, str]
+    errors: Iterable[TableRow], verdicts: Iterable[TableRow], titles: Mapping[str, str]
 ) -> list[dict[str, str]]:
     """Return targets beside the study's results, with the median error of a run in brackets.
 
@@ -229,7 +217,7 @@ def compared_rows(
         {
             "sample": titles[row["case"]],
             "quantity": legible(with_unit(row["parameter"], row["unit"])),
-            "target": _number(row["target"]),
+            "target": _legible_number(row["target"]),
             "this study: median": _median(row),
             "quartiles": _ends(row, "p25_identified", "p75_identified"),
         }
@@ -238,20 +226,22 @@ def compared_rows(
     ]
 
 
-def _ends(row: Row, low: str, high: str, unit: str = "", digits: int = 4) -> str:
-    return legible(f"{_number(row[low], digits)} to {_number(row[high], digits)}{unit}")
+def _ends(row: TableRow, low: str, high: str, unit: str = "", digits: int = 4) -> str:
+    return legible(
+        f"{_legible_number(row[low], digits)} to {_legible_number(row[high], digits)}{unit}"
+    )
 
 
-def _median(row: Row) -> str:
+def _median(row: TableRow) -> str:
     low, high = float(row["p25_identified"]), float(row["p75_identified"])
     if high > 10 * low:
         return "spread over decades"
     error = row["median_absolute_error_percent"]
     said = f" ({plain(float(f'{float(error):.2g}'))} %)" if error else ""
-    return _number(row["median_identified"]) + legible(said)
+    return _legible_number(row["median_identified"]) + legible(said)
 
 
-def share_of(row: Row) -> str:
+def share_of(row: TableRow) -> str:
     """Return a row's share of runs that reach the best encodable point, with its interval."""
     return _percent(*(float(row[f"reached_{key}"]) for key in ("share", "low", "high")))
 
@@ -260,16 +250,16 @@ def _percent(share: float, low: float, high: float) -> str:
     return legible(f"{100 * share:.0f} % ({100 * low:.0f} to {100 * high:.0f} %)")
 
 
-def _responses(rows: Iterable[Row]) -> str:
+def _range_of_responses(rows: Iterable[TableRow]) -> str:
     values = [float(row["median_evaluations"]) for row in rows]
     low, high = (f"{float(f'{end:.2g}'):,.0f}" for end in (min(values), max(values)))
     return low if low == high else f"{low} to {high}"
 
 
-def _listed(names: Sequence[str]) -> str:
+def _enumerated(names: Sequence[str]) -> str:
     *others, last = names
     return f"{', '.join(others)} and {last}" if others else last
 
 
-def _number(text: str, digits: int = 4) -> str:
+def _legible_number(text: str, digits: int = 4) -> str:
     return legible(plain(float(f"{float(text):.{digits}g}"), digits)) if text else ""

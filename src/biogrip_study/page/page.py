@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from html import escape
 from importlib.metadata import version
@@ -25,7 +25,7 @@ from biogrip_study.config.study import Case, Study
 from biogrip_study.page import answers
 from biogrip_study.records.identifications import read_verdicts
 from biogrip_study.records.traces import read_measurements
-from biogrip_study.stages.judgement import TRACE
+from biogrip_study.stages.judgement import JUDGED_SEED
 
 # Characters left for images in a report of at most 8 MB.
 _MOST_PICTURE_LETTERS = 2_800_000
@@ -33,7 +33,7 @@ _LIBRARIES = ("numpy", "scipy", "pandas", "matplotlib", "snakemake")
 # Tables, or beginnings of their names, that answers are written from.
 _ANSWERING = (
     *("errors.csv", "verdicts_", "coverage.csv"),
-    *("methods.csv", "claims.csv", "tables_5_to_7.csv", "models.csv"),
+    *("methods.csv", "tables_5_to_7.csv", "models.csv"),
 )
 # Tables under what is reconstructed; the others are under their heading.
 _EVIDENCE = ("gripper", "gene_ranges", "evidence", "printed_values")
@@ -51,15 +51,15 @@ _FIRST_FIT = 9
 # Parameters that have a slider.
 _SLID = "k", "k_p", "c", "c_p"
 # As many readings as a curve of a few hundred pixels shows.
-_MOST_READINGS = 800
+_READINGS_ON_SCREEN = 800
 # More digits than a screen shows, and fewer than those in which processors differ.
-_DIGITS = 6
+_SCREEN_DIGITS = 6
 # How far a slider goes below the least and above the largest parameter.
-_BEYOND = 10.0
+_SLIDER_BEYOND = 10.0
 
 TEMPLATES = environment(Path(__file__).parent)
 TEMPLATES.globals |= {"target_of": quantity_value}
-_NUMBER = re.compile(r"(?:&[gl]t;|[≤≥−])*\d[\d.]*(·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?(\u00a0%)?")
+_NUMBER_IN_CELL = re.compile(r"(?:&[gl]t;|[≤≥−])*\d[\d.]*(·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?(\u00a0%)?")
 
 
 @dataclass(frozen=True)
@@ -104,70 +104,30 @@ def write_report(
     }
     titles = {case.name: case.title for case in study.cases.values()}
     owners = titles | {name: sweep.title or name for name, sweep in study.config.sweeps.items()}
-    cases = list(study.cases.values())
-    measured = zip(cases, measurements, strict=True)
-    movable = [(case, of) for case, of in measured if study.published and has_sliders(case)]
-    # Where the branch relaxes fastest, its damper and the parallel one are told apart least.
-    movable.sort(key=lambda it: it[0].parameters["c"] / it[0].parameters["k"])
-    errors, judged, covered, compared, claimed, beside, models = (
-        [row for csv in downloads if csv.name.startswith(name) for row in read_table(csv)]
-        for name in _ANSWERING
-    )
-    listed: list[Entry] = []
-    for path, csv in zip(tables, downloads, strict=True):
-        entry, download = entry_of(path, owners, texts), data_url("text/csv", whole(csv).encode())
-        if entry.caption in (it.caption for it in listed):
-            entry = replace(entry, caption="")
-        listed.append(replace(entry, content=_table(path, titles), download=download))
+    judged = [*zip(study.cases.values(), map(read_verdicts, verdicts), strict=True)]
     drawn = [
         replace(entry_of(path, owners, texts), content=image, size=size)
         for path, (image, size) in zip(figures, _images(figures), strict=True)
     ]
-    if study.published:
-        story = _as_in_paper(drawn, [study.cases[name] for name in study.published])
-    else:
-        drawn, listed = ([it for it in own if _is_own(it, study)] for own in (drawn, listed))
-        story = [it for it in drawn if it.name in _UNFOLDED]
-    told = [replace(it, title="What a trace tells") for it in drawn if it.name == "answer"]
-    placed = {entry.file for entry in told + story}
-    folded: dict[str, list[Entry]] = {}
-    for entry in drawn:
-        if entry.file not in placed:
-            folded.setdefault(owners.get(entry.whose, "The study"), []).append(entry)
-    found = [*zip(cases, map(read_verdicts, verdicts), strict=True)]
-    own = [it for case, it in found if case.recorded and not study.published]
-    asked = compared, study.shown_method.title
-    who = "Run again, the paper's" if study.published else "The"
-    every = [*titles.values()]
-    named = ", ".join(every) if len(every) <= _MOST_TITLES else f"{len(every)} samples"
+    listed = [
+        replace(
+            entry_of(path, owners, texts),
+            content=_table(path, titles),
+            download=data_url("text/csv", whole(csv).encode()),
+        )
+        for path, csv in zip(tables, downloads, strict=True)
+    ]
     shown = {
-        "sliders": slid(*movable[0]) if movable else None,
-        "answers": [
-            answers.say_what_recordings_tell(own),
-            answers.say_what_traces_tell(covered, titles),
-            answers.say_what_the_study_gives(*asked, titles, who, study.optimum_tolerance),
-            answers.say_which_method_finds_it(*asked),
-            answers.say_what_claims_are(claimed),
-        ],
-        "compared": answers.rows_beside_the_paper(beside, titles)
-        or answers.compared_rows(errors, judged, titles),
-        "cases": found,
-        "better": {
-            case.name: answers.say_which_model_is_better(
-                models, case.name, case.sample.candidate, own["fit"]
-            )
-            for case, own in found
-        },
-        "told": told,
-        "story": story,
-        "folded": folded,
-        "evidence_tables": [it for it in listed if it.name in _EVIDENCE],
-        "tables": [it for it in listed if it.name not in _EVIDENCE],
+        "sliders": _sliders(study, measurements),
+        **_answered(study, judged, downloads),
+        "cases": judged,
+        **_placed(study, drawn, owners),
+        **_tables_placed(study, listed),
         # But for what changes no result.
         "config": yaml.safe_dump(
             {key: value for key, value in study.plain.items() if key != "pdf"}, allow_unicode=True
         ),
-        "title": _QUESTION if study.published else named,
+        "title": _QUESTION if study.published else _named_together([*titles.values()]),
         "paper": bool(study.published),
         "versions": {"biogrip": __version__, **{name: version(name) for name in _LIBRARIES}},
     }
@@ -175,14 +135,89 @@ def write_report(
         write_text(file, TEMPLATES.get_template(f"{template}.html.j2").render(shown))
 
 
-def write_summary(case: Case, verdicts: Path, figures: list[Path], page: Path) -> None:
-    """Write what the judged trace of a case tells, with figures, PNG."""
+def _named_together(titles: Sequence[str]) -> str:
+    return ", ".join(titles) if len(titles) <= _MOST_TITLES else f"{len(titles)} samples"
+
+
+def _sliders(study: Study, measurements: Sequence[Path]) -> dict[str, Any] | None:
+    """Return what sliders of one of the paper's cases need; None if none can have them."""
+    measured = zip(study.cases.values(), measurements, strict=True)
+    movable = [(case, of) for case, of in measured if study.published and has_sliders(case)]
+    # Where the branch relaxes fastest, its damper and the parallel one are told apart least.
+    movable.sort(key=lambda pair: pair[0].parameters["c"] / pair[0].parameters["k"])
+    return slid(*movable[0]) if movable else None
+
+
+def _answered(
+    study: Study, judged: Sequence[tuple[Case, Mapping[str, Any]]], downloads: Sequence[Path]
+) -> dict[str, Any]:
+    """Return the answers, and results beside the paper's or the truth."""
+    errors, verdicts, coverage, methods, beside, models = (
+        [row for csv in downloads if csv.name.startswith(name) for row in read_table(csv)]
+        for name in _ANSWERING
+    )
+    titles = {case.name: case.title for case in study.cases.values()}
+    recorded = [told for case, told in judged if case.recorded and not study.published]
+    asked = methods, study.shown_method.title
+    who = "Run again, the paper's" if study.published else "The"
+    return {
+        "answers": [
+            answers.say_what_recordings_tell(recorded),
+            answers.say_what_traces_tell(coverage, titles),
+            answers.say_what_the_study_gives(*asked, titles, who, study.optimum_tolerance),
+            answers.say_which_method_finds_it(*asked),
+        ],
+        "compared": answers.rows_beside_the_paper(beside, titles)
+        or answers.compared_rows(errors, verdicts, titles),
+        "better": {
+            case.name: answers.say_which_model_is_better(
+                models, case.name, case.sample.candidate, told["fit"]
+            )
+            for case, told in judged
+        },
+    }
+
+
+def _placed(study: Study, drawn: Sequence[Entry], owners: Mapping[str, str]) -> dict[str, Any]:
+    """Return figures by their place: what a trace tells, the story, and all others, folded."""
+    if study.published:
+        story = _as_in_paper(drawn, [study.cases[name] for name in study.published])
+    else:
+        drawn = [entry for entry in drawn if _is_own(entry, study)]
+        story = [entry for entry in drawn if entry.name in _UNFOLDED]
+    told = [replace(entry, title="What a trace tells") for entry in drawn if entry.name == "answer"]
+    unfolded = {entry.file for entry in told + story}
+    folded: dict[str, list[Entry]] = {}
+    for entry in drawn:
+        if entry.file not in unfolded:
+            folded.setdefault(owners.get(entry.whose, "The study"), []).append(entry)
+    return {"told": told, "story": story, "folded": folded}
+
+
+def _tables_placed(study: Study, listed: Iterable[Entry]) -> dict[str, list[Entry]]:
+    """Return tables by their place, no caption twice."""
+    places: dict[str, list[Entry]] = {"evidence_tables": [], "tables": []}
+    captions = set[str]()
+    for entry in listed:
+        once = replace(entry, caption="" if entry.caption in captions else entry.caption)
+        captions.add(entry.caption)
+        if study.published or _is_own(entry, study):
+            places["evidence_tables" if entry.name in _EVIDENCE else "tables"].append(once)
+    return places
+
+
+def write_summary(
+    case: Case, verdicts: Path, judged_fit: Path, profiles: Path, summary: Path
+) -> None:
+    """Write what the judged trace of a case tells, with two figures, PNG."""
     text = TEMPLATES.get_template("summary.html.j2").render(
         case=case,
         found=read_verdicts(verdicts),
-        figures=[(path.stem, data_url("image/png", path.read_bytes())) for path in figures],
+        figures=[
+            (path.stem, data_url("image/png", path.read_bytes())) for path in (judged_fit, profiles)
+        ],
     )
-    write_text(page, text)
+    write_text(summary, text)
 
 
 def _is_own(entry: Entry, study: Study) -> bool:
@@ -212,10 +247,14 @@ def _as_in_paper(figures: Sequence[Entry], published: Sequence[Case]) -> list[En
     first = published[0].name if published else ""
     if numbers.get((first, "fit")) == _FIRST_FIT:
         numbers |= {(first, "convergence"): _FIRST_FIT - 1, (first, "evolution"): _FIRST_FIT + 1}
-    found = {numbers.get((it.whose, it.name)): it for it in figures}
+    by_number = {numbers.get((entry.whose, entry.name)): entry for entry in figures}
     return [
-        replace(it, title=f"Figure {n}. {it.title}", caption=it.caption * (it.whose == first))
-        for n, it in sorted((n, it) for n, it in found.items() if n is not None)
+        replace(
+            by_number[n],
+            title=f"Figure {n}. {by_number[n].title}",
+            caption=by_number[n].caption * (by_number[n].whose == first),
+        )
+        for n in sorted(n for n in by_number if n is not None)
     ]
 
 
@@ -239,12 +278,12 @@ def _table(path: Path, titles: Mapping[str, str]) -> str:
 
     def cell(match: re.Match[str]) -> str:
         text = escape(titles[match[1]]) if match[1] in titles else legible(match[1])
-        return f"<td{' class=number' * bool(_NUMBER.fullmatch(text))}>{text}</td>"
+        return f"<td{' class=number' * bool(_NUMBER_IN_CELL.fullmatch(text))}>{text}</td>"
 
-    found = re.search(r"<table.*</table>", path.read_text(encoding="utf-8"), re.DOTALL)
-    if found is None:
+    table = re.search(r"<table.*</table>", path.read_text(encoding="utf-8"), re.DOTALL)
+    if table is None:
         raise BiogripError(f"{path}: holds no table.")
-    return re.sub("<td>(.*?)</td>", cell, found[0].replace("<th>", '<th scope="col">'))
+    return re.sub("<td>(.*?)</td>", cell, table[0].replace("<th>", '<th scope="col">'))
 
 
 def has_sliders(case: Case) -> bool:
@@ -257,22 +296,25 @@ def has_sliders(case: Case) -> bool:
 
 def slid(case: Case, measurements: Path) -> dict[str, Any]:
     """Return a case's first trace, thinned, with its parameters, arm and steps, in SI units."""
-    recorded, gripper = read_measurements(measurements, [TRACE]), case.experiment.gripper
-    readings, target = recorded.readings[TRACE], recorded.target
+    recorded, gripper = read_measurements(measurements, [JUDGED_SEED]), case.experiment.gripper
+    readings, target = recorded.readings[JUDGED_SEED], recorded.target
     assert target is not None
     factor, unit = scale_of(readings, case.instrument.read.unit)
-    stride = -(-len(readings) // _MOST_READINGS)
+    stride = -(-len(readings) // _READINGS_ON_SCREEN)
     values = case.parameters.values()
     return {
         "title": case.title,
         "noise": f"{factor * rms((readings - target)[::stride]):.4g}",
         "times": recorded.time_s[::stride].tolist(),
-        "readings": significant(readings[::stride], _DIGITS).tolist(),
+        "readings": significant(readings[::stride], _SCREEN_DIGITS).tolist(),
         "factor": factor,
         "unit": unit,
         "read": with_unit(case.instrument.read.title, unit),
         "sample": {name: case.parameters[name] for name in _SLID},
-        "ends": [math.log10(min(values) / _BEYOND), math.log10(max(values) * _BEYOND)],
+        "ends": [
+            math.log10(min(values) / _SLIDER_BEYOND),
+            math.log10(max(values) * _SLIDER_BEYOND),
+        ],
         "arm": {
             "stiffness": gripper.left.stiffness_Nm_per_rad,
             "damping": gripper.left.damping_Nms_per_rad,

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 # Few enough that results on different processors agree.
-_DIGITS = 8
+_HISTORY_DIGITS = 8
 
 ENCODABLE = "encodable_misfit"
 """Last column of the identifications of a case: lowest misfit that genes can encode of the
@@ -50,7 +50,7 @@ INTERVALS = RowFile(
 limits, and the estimate with uninformed parameters fixed at their true values. For some seeds, all
 quantities also have the verdict and limits that users are shown, from whole profiles."""
 
-READINGS = RowFile(
+READING_FILE = RowFile(
     "readings",
     (
         *("case", "reading", "seed"),
@@ -62,10 +62,10 @@ READINGS = RowFile(
 
 
 def read_readings(path: Path, case: Case) -> "pd.DataFrame":
-    """Read what every reading found of a case, in all seeds; parameters stand by name."""
-    names, seeds = case.study.config.readings, range(case.seeds)
-    found = READINGS.read(path, case=[case.name], reading=names, seed=seeds)
-    return found.rename(columns={p.column: p.name for p in SINGLE_BRANCH})
+    """Read what the reading that a file is named like found; parameters stand by name."""
+    seeds = range(case.seeds)
+    frame = READING_FILE.read(path, case=[case.name], reading=[path.stem], seed=seeds)
+    return frame.rename(columns={p.column: p.name for p in SINGLE_BRANCH})
 
 
 def parameters_in_file(model: SampleModel) -> tuple[Parameter, ...]:
@@ -78,7 +78,7 @@ def parameters_in_file(model: SampleModel) -> tuple[Parameter, ...]:
     return SINGLE_BRANCH if covered else model.parameters
 
 
-def columns(model: SampleModel) -> tuple[str, ...]:
+def identification_columns(model: SampleModel) -> tuple[str, ...]:
     """Return the columns of a file of identifications."""
     return (
         *("case", "method", "seed"),
@@ -88,7 +88,7 @@ def columns(model: SampleModel) -> tuple[str, ...]:
 
 
 def row_of(experiment: Experiment, answer: Fit, noise_rms: float | None) -> tuple[str | int, ...]:
-    """Return what `columns` has of an identification, after case, method and seed.
+    """Return what `identification_columns` has of an identification, after case, method and seed.
 
     Numbers have six significant digits: more than a trace determines, and few enough that
     results on different processors agree. The noise of a recorded trace is None.
@@ -111,7 +111,7 @@ def history_of(method: str, seed: int, experiment: Experiment, answer: Fit) -> d
     """Return columns of a row per generation, with eight significant digits."""
     history = answer.history
     generations = len(history.best_misfit)
-    found = {
+    columns_by_name = {
         "best_misfit": history.best_misfit,
         "median_misfit": history.median_misfit,
         **_by_column(experiment, history.best_parameters.T),
@@ -122,25 +122,29 @@ def history_of(method: str, seed: int, experiment: Experiment, answer: Fit) -> d
         "generation": np.arange(generations),
         "evaluations": np.asarray(history.evaluations),
         **{
-            name: significant(np.broadcast_to(values, generations), _DIGITS)
-            for name, values in found.items()
+            name: significant(np.broadcast_to(values, generations), _HISTORY_DIGITS)
+            for name, values in columns_by_name.items()
         },
     }
 
 
 def read_identifications(path: Path, case: Case, method: str | None = None) -> "pd.DataFrame":
     """Read identifications of a case by all methods of the study, or by one, in all seeds."""
-    frame = _read(path, case, case.study.config.methods, range(case.seeds))
+    frame = _read_methods(path, case, case.study.config.methods, range(case.seeds))
     return frame if method is None else frame[frame["method"] == method].reset_index(drop=True)
 
 
 def read_batch(path: Path, case: Case) -> "pd.DataFrame":
     """Read identifications by the method and in the seeds that the path of a batch names."""
-    return _read(path, case, [path.parent.name], seeds_of(path.stem))
+    return _read_methods(path, case, [path.parent.name], seeds_of(path.stem))
 
 
-def _read(path: Path, case: Case, methods: Sequence[str], seeds: range) -> "pd.DataFrame":
-    file = RowFile("identifications", columns(case.sample.model), ("case", "method", "stop_reason"))
+def _read_methods(path: Path, case: Case, methods: Sequence[str], seeds: range) -> "pd.DataFrame":
+    file = RowFile(
+        "identifications",
+        identification_columns(case.sample.model),
+        ("case", "method", "stop_reason"),
+    )
     return file.read(path, case=[case.name], method=methods, seed=seeds)
 
 
@@ -160,41 +164,43 @@ def read_verdicts(path: Path) -> dict[str, Any]:
 
 ALL = "all"
 """Name of the basin of all runs."""
-_FEWEST = 0.1
+_LEAST_SHARE_OF_BASIN = 0.1
 """Least share of runs that makes a basin."""
 
 
-def basins(found: "pd.DataFrame", tolerance: float) -> "dict[str, pd.DataFrame]":
+def basins(identified: "pd.DataFrame", tolerance: float) -> "dict[str, pd.DataFrame]":
     """Divide the runs of a method on a case into those that end `near_noise` and those above it.
 
     These are two basins, by their names, if a tenth of the runs or more end in each. Else there is
     one, `ALL`, as where the noise is unknown.
     """
-    near = near_noise(found, tolerance)
-    if not _FEWEST <= near.mean() <= 1 - _FEWEST:
-        return {ALL: found}
-    return {"near the noise": found[near], "above the noise": found[~near]}
+    near = near_noise(identified, tolerance)
+    if not _LEAST_SHARE_OF_BASIN <= near.mean() <= 1 - _LEAST_SHARE_OF_BASIN:
+        return {ALL: identified}
+    return {"near the noise": identified[near], "above the noise": identified[~near]}
 
 
-def chi_square_increase(found: "pd.DataFrame", case: Case, of: str = "misfit") -> Array:
+def chi_square_increase(identified: "pd.DataFrame", case: Case, of: str = "misfit") -> Array:
     """Return the increase of each identification's chi^2 over the lowest of its trace, (n,).
 
     Identifications by all methods are given, and the column of misfits. The lowest is that of any
     method, or that of the true parameters where these are known; the best fit of a few parameters
     lies below the latter.
     """
-    misfit = found["misfit"]
-    lowest = misfit.groupby(found["seed"]).transform("min")
-    lowest = np.fmin(lowest, found["noise_rms"].where(found["noise_rms"] > 0))
-    return len(case.times_s) * ((found[of] / lowest) ** 2 - 1).to_numpy(float)
+    misfit = identified["misfit"]
+    lowest = misfit.groupby(identified["seed"]).transform("min")
+    lowest = np.fmin(lowest, identified["noise_rms"].where(identified["noise_rms"] > 0))
+    return len(case.times_s) * ((identified[of] / lowest) ** 2 - 1).to_numpy(float)
 
 
-def reached_encodable(found: "pd.DataFrame", case: Case) -> BoolArray:
+def reached_encodable(identified: "pd.DataFrame", case: Case) -> BoolArray:
     """Return True for each run with chi^2 at most a tolerance above the best encodable point, (n,).
 
     Every method can reach this point or lie below it, with digits or without.
     """
-    misfit, encodable = (found[name].to_numpy(float) for name in ("misfit", "encodable_misfit"))
+    misfit, encodable = (
+        identified[name].to_numpy(float) for name in ("misfit", "encodable_misfit")
+    )
     above = len(case.times_s) * (misfit**2 - encodable**2)
     return above <= case.study.optimum_tolerance * encodable**2
 
@@ -213,18 +219,18 @@ def share_with_limits(count: int, runs: int) -> tuple[float, float, float]:
 
 def share_in_words(count: int, runs: int) -> str:
     """Return a share of runs in percent with its 95 % interval: ``18 % (10–31)``."""
-    share, low, high = (100 * each for each in share_with_limits(count, runs))
+    share, low, high = (100 * limit for limit in share_with_limits(count, runs))
     return f"{share:.0f} % ({low:.0f}–{high:.0f})"
 
 
-def near_noise(found: "pd.DataFrame", tolerance: float) -> BoolArray:
+def near_noise(identified: "pd.DataFrame", tolerance: float) -> BoolArray:
     """Return True for each seed whose misfit is at most a share above the RMS noise, (n_seeds,).
 
     Such a fit looks right in a plot. With thousands of readings it need not be an optimum:
     a misfit 2 % above the noise increases chi^2 of 4001 readings by 162; see
     `chi_square_increase`.
     """
-    misfit, noise = (found[name].to_numpy(float) for name in ("misfit", "noise_rms"))
+    misfit, noise = (identified[name].to_numpy(float) for name in ("misfit", "noise_rms"))
     return misfit <= (1 + tolerance) * noise
 
 

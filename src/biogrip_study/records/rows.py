@@ -74,12 +74,12 @@ def require_rows(
     path: Path, frame: "pd.DataFrame", columns: Sequence[str], wanted: Iterable[tuple[Any, ...]]
 ) -> None:
     """Refuse, by a `BiogripError`, a file without each row that is wanted once, or with others."""
-    found, known = [*frame[[*columns]].itertuples(index=False, name=None)], [*wanted]
-    if len(found) == len(known) and {*found} == {*known}:
+    rows, known = [*frame[[*columns]].itertuples(index=False, name=None)], [*wanted]
+    if len(rows) == len(known) and {*rows} == {*known}:
         return
-    lacking = [row for row in known if row not in {*found}]
+    lacking = [row for row in known if row not in {*rows}]
     text = f", and none of {', '.join(map(str, lacking[0]))}" if lacking else ""
-    raise BiogripError(f"{path}: found {len(found)} rows, wanted {len(known)}{text}. {AGAIN}")
+    raise BiogripError(f"{path}: found {len(rows)} rows, wanted {len(known)}{text}. {AGAIN}")
 
 
 def write_arrays(path: Path, arrays: Mapping[str, Any]) -> None:
@@ -104,4 +104,4 @@ def read_arrays(path: Path) -> dict[str, Array]:
 
 def join_arrays(several: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
     """Join arrays of the same names end to end."""
-    return {name: np.concatenate([each[name] for each in several]) for name in several[0]}
+    return {name: np.concatenate([arrays[name] for arrays in several]) for name in several[0]}

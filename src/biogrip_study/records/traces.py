@@ -14,8 +14,8 @@ from biogrip.traces.reader import Recording
 from biogrip_study.records.rows import read_arrays, write_arrays
 
 # More than any instrument gives, and few enough that results on different processors agree.
-_DIGITS = 9
-_WRITTEN = f"{{:.{_DIGITS - 1}e}}"
+_TARGET_DIGITS = 9
+_WRITTEN = f"{{:.{_TARGET_DIGITS - 1}e}}"
 
 
 @dataclass(frozen=True)
@@ -30,6 +30,8 @@ class Measurements:
     """Noisy trace of each seed, (n_samples,) each."""
     sd: Array | None = None
     """Standard deviations of the readings, (n_samples,), where they are known."""
+    correlation: Array | None = None
+    """Correlation of the noise of both moduli of a sweep, (n_frequencies,)."""
     sd_known: bool = True
     """False if only their ratios are, see `Recording.sd_known`."""
     onset_s: float | None = None
@@ -47,6 +49,7 @@ class Measurements:
             readings,
             index,
             sd=self.sd,
+            correlation=self.correlation,
             sd_known=self.sd_known,
             onset_s=self.onset_s,
             remarks_before=self.remarks,
@@ -70,7 +73,7 @@ def write_target(
     simulated = [read]
     if jaw_force_N is not None:
         largest = float(np.max(np.abs(jaw_force_N)))
-        digit = 10.0 ** (math.floor(math.log10(largest)) + 1 - _DIGITS) if largest else 1.0
+        digit = 10.0 ** (math.floor(math.log10(largest)) + 1 - _TARGET_DIGITS) if largest else 1.0
         columns.append("jaw_force_N")
         simulated.append((np.round(jaw_force_N / digit) + 0.0) * digit)
     rows = (
@@ -101,6 +104,7 @@ def write_measurements(path: Path, measurements: Measurements) -> None:
         "time_s": measurements.time_s,
         "target": measurements.target,
         "sd": measurements.sd,
+        "correlation": measurements.correlation,
         "sd_known": None if measurements.sd_known else False,
         "seeds": list(measurements.readings),
         "traces": list(measurements.readings.values()),
@@ -112,18 +116,19 @@ def write_measurements(path: Path, measurements: Measurements) -> None:
 
 def read_measurements(path: Path, seeds: list[int] | None = None) -> Measurements:
     """Read noisy traces of all or of given seeds, which it must have."""
-    found = read_arrays(path)
-    traces = dict(zip(found["seeds"].tolist(), found["traces"], strict=True))
+    arrays = read_arrays(path)
+    traces = dict(zip(arrays["seeds"].tolist(), arrays["traces"], strict=True))
     if missing := set(seeds or ()) - set(traces):
         raise BiogripError(f"{path}: has no trace of seed {min(missing)}.")
     chosen = traces if seeds is None else {seed: traces[seed] for seed in seeds}
-    onset_s = found.get("onset_s")
+    onset_s = arrays.get("onset_s")
     return Measurements(
-        found["time_s"],
-        found.get("target"),
+        arrays["time_s"],
+        arrays.get("target"),
         chosen,
-        sd=found.get("sd"),
-        sd_known="sd_known" not in found,
+        sd=arrays.get("sd"),
+        correlation=arrays.get("correlation"),
+        sd_known="sd_known" not in arrays,
         onset_s=None if onset_s is None else float(onset_s),
-        remarks=tuple(map(str, found.get("remarks", ()))),
+        remarks=tuple(map(str, arrays.get("remarks", ()))),
     )

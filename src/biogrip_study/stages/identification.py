@@ -1,10 +1,10 @@
 """Identification of the sample in noisy traces: by a method, and with every sample model.
 
-A job has a batch of the seeds of a case. `identify` writes what a method finds in each trace, with
-the history of its search; `join` puts the batches of a case together, a row per method and seed,
-with what the genes could have held of each trace. `fit` writes the misfits of all sample models,
-for model selection. Traces are fitted in groups, which are small enough for little memory; results
-do not depend on the grouping.
+A job has a batch of the seeds of a case. `identify_seeds` writes what a method finds in each trace,
+with the history of its search; `join` puts the batches of a case together, a row per method and
+seed, with what the genes could have held of each trace. `fit` writes the misfits of all sample
+models, for model selection. Traces are fitted in groups, which are small enough for little memory;
+results do not depend on the grouping.
 """
 
 from collections import defaultdict
@@ -27,8 +27,8 @@ from biogrip_study.methods.registry import identifier
 from biogrip_study.records.identifications import (
     ENCODABLE,
     MODEL_FITS,
-    columns,
     history_of,
+    identification_columns,
     read_batch,
     row_of,
 )
@@ -38,12 +38,12 @@ from biogrip_study.records.traces import Measurements, read_measurements
 _JOINT = 63
 
 
-def groups(seeds: Sequence[int], times: int = 1) -> Iterator[Sequence[int]]:
+def seed_groups(seeds: Sequence[int], times: int = 1) -> Iterator[Sequence[int]]:
     """Return the seeds of a batch in groups."""
     return (seeds[some] for some in parts(len(seeds), times * _JOINT))
 
 
-def identify(
+def identify_seeds(
     case: Case,
     method: str,
     seeds: Sequence[int],
@@ -58,7 +58,7 @@ def identify(
     experiment = experiment_for(case.experiment, recorded, calibrated).to_identify()
     progress = Progress(f"{case.name}, {method}", len(seeds))
     rows, histories = [], []
-    for group in groups(seeds):
+    for group in seed_groups(seeds):
         traces = [recorded.readings[seed] for seed in group]
         rngs = [stream(case.study.config.study_seed, case.name, seed, method) for seed in group]
         problems = experiment.of_each(recorded.time_s, traces)
@@ -68,7 +68,7 @@ def identify(
             rows.append((case.name, method, seed, *row_of(experiment, answer, noise)))
             histories.append(history_of(method, seed, experiment, answer))
         progress.done(len(group))
-    write_rows(parameters, columns(experiment.model), rows)
+    write_rows(parameters, identification_columns(experiment.model), rows)
     write_arrays(history, join_arrays(histories))
 
 
@@ -102,7 +102,7 @@ def join(
         for seed, of_trace in zip(map(str, traces), posed, strict=True):
             misfit = lowest_encodable(of_trace.residuals.misfit, ranges, np.array(ends[seed]))
             lowest[seed] = f"{misfit:.6e}"
-    header = columns(case.sample.model)
+    header = identification_columns(case.sample.model)
     joined = ([*map(row.get, header), lowest.get(row["seed"], "")] for row in rows)
     write_rows(identifications, (*header, ENCODABLE), joined)
     write_arrays(history, join_arrays([read_arrays(batch) for batch in histories]))
@@ -117,7 +117,7 @@ def fit(
     experiment = experiment_for(case.experiment, recorded, calibrated).to_identify(*models.values())
     progress = Progress(f"{case.name}, models", len(models) * len(seeds))
     rows: dict[str, list[tuple[str | int, ...]]] = {name: [] for name in models}
-    for group in groups(seeds):
+    for group in seed_groups(seeds):
         traces = experiment.of_each(recorded.time_s, [recorded.readings[seed] for seed in group])
         posed, rngs = {}, {}
         for name, model in models.items():
@@ -125,8 +125,8 @@ def fit(
             whose = case.study.config.study_seed, case.name
             rngs[name] = [stream(*whose, seed, f"model {name}") for seed in group]
         done = partial(progress.done, len(group))
-        found = fit_models(posed, case.block.least_squares, rngs, done)
-        for name, answers in found.items():
+        fits_by_model = fit_models(posed, case.block.least_squares, rngs, done)
+        for name, answers in fits_by_model.items():
             sizes = len(models[name].names), len(recorded.time_s)
             rows[name] += [
                 (case.name, name, seed, *sizes, f"{answer.misfit:.8e}")

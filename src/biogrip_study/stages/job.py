@@ -12,6 +12,7 @@ import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stderr
 from dataclasses import MISSING, Field, fields
+from importlib import import_module
 from inspect import signature
 from pathlib import Path
 from typing import Any, ClassVar, get_type_hints
@@ -46,26 +47,11 @@ class _Named:
         return super().__getattribute__(name)
 
 
-class _NamedOfStudy(_Named, StudyConfig):
-    pass
-
-
-class _NamedOfCase(_Named, CaseBlock):
-    pass
-
-
-class _NamedOfMeasurement(_Named, MeasurementBlock):
-    pass
-
-
-class _NamedOfIdentifiability(_Named, Identifiability):
-    pass
-
-
 # Blocks of which a rule may name single keys.
-_SPLIT: dict[str, type[_Named]] = {
-    "measurement": _NamedOfMeasurement,
-    "identifiability": _NamedOfIdentifiability,
+_SPLIT = {"measurement": MeasurementBlock, "identifiability": Identifiability}
+_WITH_KEYS = {
+    kind: type(f"_NamedOf{kind.__name__}", (_Named, kind), {})
+    for kind in (StudyConfig, CaseBlock, *_SPLIT.values())
 }
 
 
@@ -80,7 +66,9 @@ def settings(study: Study, keys: Iterable[str], case: str = "") -> dict[str, Any
         # What the case leaves at its default is not the study's: it has all of its blocks.
         blocks = {key: value for key, value in blocks.items() if key not in CASE_KEYS}
         blocks |= study.case(case).plain | {"seeds": study.case(case).seeds}
-    blocks = blocks | {"cases": {name: it.plain for name, it in study.cases.items()}}
+    blocks = blocks | {
+        "cases": {name: case_of_study.plain for name, case_of_study in study.cases.items()}
+    }
 
     def value_of(block: Mapping[str, Any] | None, key: str) -> Any:
         name, _, inner = key.partition(".")
@@ -95,10 +83,10 @@ def keys_of_cases(study: Study, *keys: str) -> list[str]:
     return [f"cases.{name}.{key}" for name in study.cases for key in keys]
 
 
-def case_of(name: str, given: Mapping[str, Any]) -> Case:
+def case_with_keys(name: str, given: Mapping[str, Any]) -> Case:
     """Return a case of which some keys are given, by `settings`."""
-    study = Study(_named(_NamedOfStudy, given))
-    return Case(name, _named(_NamedOfCase, given), study.config, study=study)
+    study = Study(_named(StudyConfig, given))
+    return Case(name, _named(CaseBlock, given), study.config, study=study)
 
 
 def study_of(given: Mapping[str, Any]) -> Study:
@@ -108,8 +96,8 @@ def study_of(given: Mapping[str, Any]) -> Study:
         if key.startswith("cases."):
             _, name, inner = key.split(".", 2)
             cases.setdefault(name, {})[inner] = value
-    blocks = {name: _named(_NamedOfCase, own) for name, own in cases.items()}
-    return Study(_named(_NamedOfStudy, given, cases=blocks))
+    blocks = {name: _named(CaseBlock, keys) for name, keys in cases.items()}
+    return Study(_named(StudyConfig, given, cases=blocks))
 
 
 def _named(kind: Any, given: Mapping[str, Any], **keys: Any) -> Any:
@@ -125,7 +113,7 @@ def _named(kind: Any, given: Mapping[str, Any], **keys: Any) -> Any:
         elif field.name in given:
             made = field.default_factory
             keys[field.name] = field.default if made is MISSING else made()
-    return kind(keys)
+    return _WITH_KEYS[kind](keys)
 
 
 def batch_names(seeds: int, size: int) -> list[str]:
@@ -151,7 +139,7 @@ def logged(job: Any) -> Iterator[None]:
 
 def job_case(job: Any) -> Case:
     """Return the case of a job, with the keys of the config that its rule names."""
-    return case_of(job.wildcards.case, job_settings(job))
+    return case_with_keys(job.wildcards.case, job_settings(job))
 
 
 def job_study(job: Any) -> Study:
@@ -167,13 +155,20 @@ def job_settings(job: Any) -> dict[str, Any]:
     return given
 
 
+def called(stage: str, job: Any) -> Any:
+    """Call the function of a full name with what it takes of a job, see `arguments`."""
+    module, _, name = stage.rpartition(".")
+    function = getattr(import_module(module), name)
+    return function(**arguments(job, function))
+
+
 def arguments(job: Any, function: Callable[..., object]) -> dict[str, Any]:
     """Return what a function takes: params, wildcards and files of a job's rule, by their names.
 
     ``case`` is the case, ``study`` the study, and ``seeds`` are those of the batch.
     """
     of_job = job.params, job.wildcards, job.input, job.output
-    given: dict[str, Any] = {name: it for of in of_job for name, it in of.items()}
+    given: dict[str, Any] = {name: value for of in of_job for name, value in of.items()}
     given["seeds"] = [*seeds_of(given.get("batch", "seeds_0-0"))]
     for name, kind in get_type_hints(function).items():
         if kind is Case:

@@ -4,10 +4,10 @@
 simulated one the experiment is known, so that neither start, offset, drift nor model are doubted.
 `expect` writes those to expect of any, from the trace without noise.
 
-`estimate` tests the coverage of limits and the spread of fits. Every seed is fitted by least
-squares, and quantities that traces should determine get limits from their profile likelihoods. A
-second estimate has parameters without information fixed at their true values, as the Cramér-Rao
-bound assumes. Some seeds get a full verdict as well, as users are shown it: multiples of
+`estimate_intervals` tests the coverage of limits and the spread of fits. Every seed is fitted by
+least squares, and quantities that traces should determine get limits from their profile
+likelihoods. A second estimate has parameters without information fixed at their true values, as the
+Cramér-Rao bound assumes. Some seeds get a full verdict as well, as users are shown it: multiples of
 `verdicts_every`, whatever the batch.
 """
 
@@ -38,20 +38,19 @@ from biogrip_study.config.study import Case
 from biogrip_study.gripper.calibration import with_calibration
 from biogrip_study.records.identifications import INTERVALS, read_verdicts
 from biogrip_study.records.traces import read_measurements, read_target
-from biogrip_study.stages.identification import experiment_for, groups
+from biogrip_study.stages.identification import experiment_for, seed_groups
 
-TRACE = 0
+JUDGED_SEED = 0
 """Seed of the trace that is judged."""
 
 
 def judge(case: Case, measurements: Path, calibrated: list[Path], verdicts: Path) -> None:
-    """Identify the trace of seed 0, and write verdicts, profiles and valley."""
-    recorded = read_measurements(measurements, [TRACE])
+    """Identify the trace of seed 0, and write verdicts and profiles."""
+    recorded = read_measurements(measurements, [JUDGED_SEED])
     experiment = experiment_for(case.judged_experiment, recorded, calibrated)
-    (diagnosis,) = identify_alike([(recorded.recording, experiment)], valley=True)
+    (diagnosis,) = identify_alike([(recorded.recording, experiment)])
     assert diagnosis.fit
-    more = {"noise_model": diagnosis.fit.noise_data(), "valley": diagnosis.valley}
-    _write(verdicts, case, diagnosis, more)
+    _write_diagnosis(verdicts, case, diagnosis, {"noise_model": diagnosis.fit.noise_data()})
 
 
 def expect(case: Case, target: Path, calibrated: list[Path], expected: Path) -> None:
@@ -65,17 +64,17 @@ def expect(case: Case, target: Path, calibrated: list[Path], expected: Path) -> 
     noise_sd = rms(standard_deviation(rotation, case.noise)) or None
     problem = experiment.of(time_s, rotation, noise_sd=noise_sd)
     truth = experiment.logs(case.parameters)
-    found = identify_from(problem, truth)
+    best_fit = identify_from(problem, truth)
     misfit = float(problem.residuals.misfit(np.exp(truth)[None])[0])
-    gain = len(time_s) * (misfit**2 - found.misfit**2) / (noise_sd or found.misfit) ** 2
-    if gain < _ROUNDING:
+    gain = len(time_s) * (misfit**2 - best_fit.misfit**2) / (noise_sd or best_fit.misfit) ** 2
+    if gain < _GAIN_BY_ROUNDING:
         # Along what nothing tells, digits of the target would choose, and those of a processor.
-        found = replace(found, parameters=np.exp(truth), misfit=misfit, converged=True)
-    diagnosis = diagnose(problem, found, confidence=case.confidence)
-    _write(expected, case, diagnosis, {})
+        best_fit = replace(best_fit, parameters=np.exp(truth), misfit=misfit, converged=True)
+    diagnosis = diagnose(problem, best_fit, confidence=case.confidence)
+    _write_diagnosis(expected, case, diagnosis, {})
 
 
-def _write(path: Path, case: Case, diagnosis: Diagnosis, more: dict[str, Any]) -> None:
+def _write_diagnosis(path: Path, case: Case, diagnosis: Diagnosis, more: dict[str, Any]) -> None:
     """Write a diagnosis as JSON. The case says what is read, and no name has its unit."""
     said = {
         key.removesuffix("_rad"): value
@@ -86,14 +85,14 @@ def _write(path: Path, case: Case, diagnosis: Diagnosis, more: dict[str, Any]) -
 
 
 # Decrease of chi^2 from the true parameters that is rounding.
-_ROUNDING = 1e-3
+_GAIN_BY_ROUNDING = 1e-3
 # Significant digits, and those of values known to within a relative `_NARROW`.
-_DIGITS, _MORE_DIGITS, _NARROW = 5, 9, 1e-3
+_ESTIMATE_DIGITS, _MORE_DIGITS, _NARROW = 5, 9, 1e-3
 # Local fits need less memory per seed than populations.
-_TIMES = 2
+_GROUPS_AT_ONCE = 2
 
 
-def estimate(
+def estimate_intervals(
     case: Case,
     seeds: Sequence[int],
     target: Path,
@@ -107,15 +106,15 @@ def estimate(
     """
     experiment = with_calibration(case.judged_experiment, calibrated)
     time_s, _, rotation = read_target(target, case.times_s)
-    found = read_verdicts(expected)["quantities"]
-    determined = {item["quantity"] for item in found if item["verdict"] == DETERMINED}
+    foreseen = read_verdicts(expected)["quantities"]
+    determined = {item["quantity"] for item in foreseen if item["verdict"] == DETERMINED}
     every = parameters_and_sum(experiment.searched)
     selected = [quantity for quantity in every if quantity.label in determined]
     rest_known, informed, truth = _rest_known(case, experiment, time_s, rotation)
     often = case.block.identifiability.verdicts_every
     progress = Progress(f"{case.name}, intervals", len(seeds))
     rows: list[tuple[Any, ...]] = []
-    for group in groups(seeds, _TIMES):
+    for group in seed_groups(seeds, _GROUPS_AT_ONCE):
         rngs = [experiment.stream("noise", seed) for seed in group]
         traces = [add_noise(rotation, case.noise, rng, time_s) for rng in rngs]
         fits = fit_least_squares(
@@ -166,8 +165,8 @@ def judge_quantities(
         every = compute_findings(likelihoods, quantities, smooth=False)
         return [profiled(*pair, []) for pair in zip(likelihoods, every, strict=True)]
 
-    problems, found = [fit.problem for fit in fits], [fit.found for fit in fits]
-    judged = settled(problems, found, profile, confidence=confidence)
+    problems, best_fits = [fit.problem for fit in fits], [fit.found for fit in fits]
+    judged = settled(problems, best_fits, profile, confidence=confidence)
     return [diagnosis for diagnosis, _ in judged]
 
 
@@ -178,11 +177,11 @@ def _estimates(
 
     Given are limits and the log-parameters of the fit with the rest fixed.
     """
-    logs, digits = [quantity.log(best), None, None, None], _DIGITS
+    logs, digits = [quantity.log(best), None, None, None], _ESTIMATE_DIGITS
     if with_limits is not None:
         finding, known = with_limits
         low, high = finding.profile.low, finding.profile.high
         logs[1:] = low, high, quantity.log(known)
         narrow = low is not None and high is not None and high - low < _NARROW
-        digits = _MORE_DIGITS if narrow else _DIGITS
+        digits = _MORE_DIGITS if narrow else _ESTIMATE_DIGITS
     return ["" if log is None else f"{math.exp(log):.{digits}g}" for log in logs]

@@ -25,7 +25,7 @@ from biogrip_study.records.rows import write_arrays
 from biogrip_study.records.traces import Measurements, read_target, write_measurements, write_target
 
 
-def simulate(case: Case, target: Path) -> None:
+def simulate_target(case: Case, target: Path) -> None:
     """Simulate a case, and write its target, CSV.
 
     A response that is not finite, or turns the arms beyond the combs' stroke, is an error.
@@ -48,8 +48,8 @@ def response(case: Case, time_s: Array) -> tuple[Array, Array | None]:
     """Return what is read and, if there are jaws, their force, (n_samples,) each."""
     device, nonlinear = (case.gripper, case.network, case.torque), case.nonlinear_target
     if case.unilateral:
-        found = unilateral_response(*device, time_s)
-        return found.rotation[0], found.jaw_force_N
+        apart = unilateral_response(*device, time_s)
+        return apart.rotation[0], apart.jaw_force_N
     read = target_rotation(*device, time_s, nonlinear=nonlinear)[0]
     if not case.instrument.has_jaws:
         return read, None
@@ -91,7 +91,7 @@ def calibrate_gripper(case: Case, gripper: Path, records: Path) -> None:
     time_s = sample_times(test.duration_s, test.rate_Hz)
     noise = Noise("gaussian", test.noise_level, "peak")
     causes = test.step_torque_Nm, test.impulse_Nms
-    columns, found = {"time_s": time_s}, {}
+    columns, arms = {"time_s": time_s}, {}
     for name in ("left", "right"):
         motion = free_motion(getattr(case.gripper, name), time_s, *causes)
         rng = stream(case.study.config.study_seed, case.name, 0, f"calibration {name}")
@@ -99,9 +99,9 @@ def calibrate_gripper(case: Case, gripper: Path, records: Path) -> None:
             time_s, add_noise(motion.step, noise, rng), add_noise(motion.impulse, noise, rng)
         )
         columns |= {f"{name}_step_rad": record.step, f"{name}_impulse_rad": record.impulse}
-        found[name] = calibrate(record, *causes)
+        arms[name] = calibrate(record, *causes)
     write_arrays(records, columns)
-    write_text(gripper, calibration_yaml(found["left"], found["right"]))
+    write_text(gripper, calibration_yaml(arms["left"], arms["right"]))
 
 
 def record(case: Case, recorded: Path, measurements: Path) -> None:
@@ -117,6 +117,6 @@ def record(case: Case, recorded: Path, measurements: Path) -> None:
     remarks = tuple(trace.remarks())
     for remark in remarks:
         warn(f"{place(recorded)}: {remark}")
-    known = trace.sd, trace.sd_known, trace.onset_s, remarks
-    found = Measurements(trace.time_s, None, {0: trace.readings}, *known)
-    write_measurements(measurements, found)
+    known = trace.sd, trace.correlation, trace.sd_known, trace.onset_s, remarks
+    measured_trace = Measurements(trace.time_s, None, {0: trace.readings}, *known)
+    write_measurements(measurements, measured_trace)

@@ -26,10 +26,10 @@ from biogrip_study.records.identifications import (
     read_verdicts,
     share_with_limits,
 )
-from biogrip_study.tables.layout import Column, Row, ShownTable, titled, write
+from biogrip_study.tables.layout import Column, Row, ShownTable, titled
 
 _PERCENTILES = {"p05": 5, "p25": 25, "median": 50, "p75": 75, "p95": 95}
-_COLUMNS = (
+_ERROR_COLUMNS = (
     *titled("case", "parameter", "unit"),
     Column("target", "Target", 4),
     Column("paper_identified", "Paper", 4),
@@ -49,35 +49,22 @@ _BASINS = (
 )
 
 
-def _columns(near_noise_tolerance: float) -> tuple[Column, ...]:
+def _error_columns(near_noise_tolerance: float) -> tuple[Column, ...]:
     share = f"Share {near_noise_words(near_noise_tolerance)}"
     ends = (Column(f"near_noise_{end}", f"95 % {end}", 2) for end in ("from", "to"))
-    return (*_COLUMNS, Column("near_noise_share", share, 2), *ends)
-
-
-def write_tables(
-    case: Case,
-    identifications: Path,
-    judged: Path,
-    expected: list[Path],
-    errors: Path,
-    verdicts: Path,
-) -> None:
-    """Write the tables of a case: its errors and its verdicts."""
-    write(errors_of_case(case, identifications), errors)
-    write(verdicts_of_case(case, judged, expected), verdicts)
+    return (*_ERROR_COLUMNS, Column("near_noise_share", share, 2), *ends)
 
 
 def errors_of_case(case: Case, identifications: Path) -> ShownTable:
     """Compare target and identified values of one case, given its identifications, CSV."""
     tolerance = case.study.near_noise_tolerance
-    found = read_identifications(identifications, case, case.study.shown_method.name)
+    identified = read_identifications(identifications, case, case.study.shown_method.name)
     of_case: Row = {"case": case.name}
-    if found["noise_rms"].notna().all():
-        near = share_with_limits(int(near_noise(found, tolerance).sum()), len(found))
+    if identified["noise_rms"].notna().all():
+        near = share_with_limits(int(near_noise(identified, tolerance).sum()), len(identified))
         of_case |= zip((f"near_noise_{end}" for end in ("share", "from", "to")), near, strict=True)
     rows = []
-    for basin, runs in ({ALL: found} | basins(found, tolerance)).items():
+    for basin, runs in ({ALL: identified} | basins(identified, tolerance)).items():
         for quantity in case.sample.model.quantities:
             names = [parameter.name for parameter in quantity]
             target = quantity_value(label := " + ".join(names), case.parameters)
@@ -97,11 +84,11 @@ def errors_of_case(case: Case, identifications: Path) -> ShownTable:
     number = f"Table {case.published.table}. " if case.published.table is not None else ""
     caption = (
         f"{number}{case.title}: target and identified parameters over "
-        f"{counted(len(found), 'seed')}. {_BASINS}"
+        f"{counted(len(identified), 'seed')}. {_BASINS}"
         if case.parameters
         else f"{case.title}: parameters identified in the recorded trace."
     )
-    return ShownTable(caption, _columns(tolerance), rows)
+    return ShownTable(caption, _error_columns(tolerance), rows)
 
 
 def error_percent(target: float | None, identified: Array) -> Array:
@@ -113,15 +100,13 @@ def error_percent(target: float | None, identified: Array) -> Array:
 
 def _of_paper(case: Case, names: list[str], target: float | None) -> Row:
     """Return the paper's value and error; of a sum, what its members' printed errors make them."""
-    told = value_in_case(case, names)
+    told, printed = value_in_case(case, names), case.published
     if told is None:
         return {}
-    if len(names) > 1:
-        error = error_percent(target, np.array(told[:1]))[0]
-        return {"paper_identified": told[0], "paper_error_percent": error}
-    (name,) = names
-    error = case.published.error_percent.get(name)
-    return {"paper_identified": case.published.identified[name], "paper_error_percent": error}
+    value, error = told[0], error_percent(target, np.array(told[:1]))[0]
+    if len(names) == 1:
+        value, error = printed.identified[names[0]], printed.error_percent.get(names[0])
+    return {"paper_identified": value, "paper_error_percent": error}
 
 
 def errors(study: Study, identifications: list[Path]) -> ShownTable:
@@ -132,7 +117,7 @@ def errors(study: Study, identifications: list[Path]) -> ShownTable:
         # Text, as ">100", stays; not every case or parameter has one.
         with suppress(ValueError, TypeError, KeyError):
             row["paper_error_percent"] = float(row["paper_error_percent"])
-    columns = _columns(study.near_noise_tolerance)
+    columns = _error_columns(study.near_noise_tolerance)
     return ShownTable(f"Identification errors of all cases. {_BASINS}", columns, rows)
 
 
@@ -150,12 +135,12 @@ _VERDICT_COLUMNS = (
 )
 
 
-def verdicts_of_case(case: Case, measured: Path, expected: list[Path]) -> ShownTable:
+def verdicts_of_case(case: Case, verdicts: Path, expected: list[Path]) -> ShownTable:
     """List the verdicts on all quantities of a case, and those expected, where there are any."""
-    found, others = read_verdicts(measured), [read_verdicts(path) for path in expected]
+    judged, others = read_verdicts(verdicts), [read_verdicts(path) for path in expected]
     foreseen_of = {item["quantity"]: item for item in others[0]["quantities"]} if others else {}
     rows = []
-    for item in found["quantities"]:
+    for item in judged["quantities"]:
         foreseen = foreseen_of.get(item["quantity"], {})
         gaps = " and ".join(f"{start:.3g} to {end:.3g}" for start, end in item["excluded"])
         rows.append(
@@ -164,7 +149,7 @@ def verdicts_of_case(case: Case, measured: Path, expected: list[Path]) -> ShownT
             | {
                 "case": case.name,
                 "target": quantity_value(item["quantity"], case.parameters),
-                "fit": found["fit"],
+                "fit": judged["fit"],
                 "value": item["value"] if item["verdict"] == DETERMINED else None,
                 "excluded": gaps,
             }
@@ -172,15 +157,15 @@ def verdicts_of_case(case: Case, measured: Path, expected: list[Path]) -> ShownT
     trades = "".join(
         f" {' and '.join(trade['members'])} trade against each other: determined is "
         f"{trade['quantity']}."
-        for trade in found["trades"]
+        for trade in judged["trades"]
     )
     caption = (
         f"{case.title}: verdicts on the trace of one seed, from profile likelihoods.{trades} "
-        f"One-sided limits hold with {50 * (1 + found['confidence']):g} % confidence."
+        f"One-sided limits hold with {50 * (1 + judged['confidence']):g} % confidence."
     )
     if others:
         caption += " Expected: the same for the trace without noise, judged at the noise level."
-    percent = f"{100 * found['confidence']:g} %"
+    percent = f"{100 * judged['confidence']:g} %"
     columns = tuple(replace(c, heading=c.heading.format(percent=percent)) for c in _VERDICT_COLUMNS)
     return ShownTable(caption, columns, rows)
 
@@ -194,7 +179,7 @@ def interval_of(
     counts.
     """
     values = _ways(Decimal(f"{printed:.15g}"))
-    found = []
+    overlaps = []
     with suppress(InvalidOperation, TypeError):
         # The paper's signs differ; on which side a value lies it shows itself.
         errors = _ways(abs(Decimal(error_percent or "unknown")))
@@ -202,8 +187,8 @@ def interval_of(
         sign = -1 if printed < true else 1
         for value, error in product(values, errors):
             ends = sorted(true * (1 + sign * end / 100) for end in error)
-            found.append((max(value[0], ends[0]), min(value[1], ends[1])))
-    held = [ends for ends in found if ends[0] <= ends[1]] or values
+            overlaps.append((max(value[0], ends[0]), min(value[1], ends[1])))
+    held = [ends for ends in overlaps if ends[0] <= ends[1]] or values
     return float(min(low for low, _ in held)), float(max(high for _, high in held))
 
 
@@ -220,7 +205,7 @@ def value_in_case(case: Case, names: Sequence[str]) -> tuple[float, float, float
         printed, target = told.identified[name], case.parameters.get(name)
         low, high = interval_of(printed, target, told.error_percent.get(name))
         value = printed if low <= printed <= high else (low + high) / 2
-        sums = [total + each for total, each in zip(sums, (value, low, high), strict=True)]
+        sums = [total + number for total, number in zip(sums, (value, low, high), strict=True)]
     return sums[0], sums[1], sums[2]
 
 

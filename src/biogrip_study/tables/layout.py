@@ -64,7 +64,7 @@ def write(table: ShownTable, output: Path) -> None:
     """Write a table as CSV, and without empty columns as HTML beside it."""
     columns = table.columns
     shown = pd.DataFrame(
-        [[_text(row.get(c.name), c.digits) for c in columns] for row in table.rows],
+        [[_cell_text(row.get(c.name), c.digits) for c in columns] for row in table.rows],
         columns=[c.heading for c in columns],
     )
     if len(shown):
@@ -74,7 +74,7 @@ def write(table: ShownTable, output: Path) -> None:
         f"</head><body>\n<p>{escape(table.caption)}</p>\n{shown.to_html(index=False, border=0)}\n"
         "</body></html>\n"
     )
-    cells = ([_text(row.get(c.name), 6) for c in columns] for row in table.rows)
+    cells = ([_cell_text(row.get(c.name), 6) for c in columns] for row in table.rows)
     write_rows(output, [c.name for c in columns], cells)
     write_text(output.with_suffix(".html"), html)
 
@@ -112,7 +112,7 @@ def as_published(table: Path) -> tuple[str, str]:
     return table.name, table.read_bytes().decode()
 
 
-def _text(cell: Any, digits: int) -> str:
+def _cell_text(cell: Any, digits: int) -> str:
     if cell is None:
         return ""
     if isinstance(cell, float | np.floating):

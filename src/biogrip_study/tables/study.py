@@ -46,11 +46,11 @@ def methods(study: Study, identifications: list[Path]) -> ShownTable:
     rows = []
     labels = {}
     for (name, case), path in zip(study.cases.items(), identifications, strict=True):
-        found = read_identifications(path, case)
-        found["increase"] = chi_square_increase(found, case)
-        found["least"] = chi_square_increase(found, case, ENCODABLE)
-        found["reached"] = reached_encodable(found, case)
-        for method, mine in found.groupby("method", sort=False):
+        identified = read_identifications(path, case)
+        identified["increase"] = chi_square_increase(identified, case)
+        identified["least"] = chi_square_increase(identified, case, ENCODABLE)
+        identified["reached"] = reached_encodable(identified, case)
+        for method, mine in identified.groupby("method", sort=False):
             row: Row = {
                 "case": name,
                 "method": METHODS[method].title,
@@ -92,12 +92,14 @@ _MODEL_COLUMNS = (
 
 def models(study: Study, fits: list[Path]) -> ShownTable:
     """Count over seeds which model has the lowest AIC and BIC, see `aic_and_bic`."""
-    found = pd.concat([read_fits(study, path) for path in fits])
-    found["aic"], found["bic"] = aic_and_bic(found["misfit"], found["samples"], found["parameters"])
+    fitted = pd.concat([read_fits(study, path) for path in fits])
+    fitted["aic"], fitted["bic"] = aic_and_bic(
+        fitted["misfit"], fitted["samples"], fitted["parameters"]
+    )
     rows = []
     for case, made in study.cases.items():
         maker = None if made.recorded else made.sample.candidate
-        of_case = found[found["case"] == case]
+        of_case = fitted[fitted["case"] == case]
         # In the configured order, since idxmin takes the first of equals.
         tried = list(of_case["model"].unique())
         values = {c: of_case.pivot(index="seed", columns="model", values=c) for c in ("aic", "bic")}
@@ -106,9 +108,9 @@ def models(study: Study, fits: list[Path]) -> ShownTable:
             model = made.models[name].model
             row: Row = {"case": case, "model": model.title + " (made the traces)" * (name == maker)}
             row |= {"parameters": len(model.names), "seeds": len(delta["aic"])}
-            for criterion, each in delta.items():
-                row[f"median_delta_{criterion}"] = each[name].median()
-                row[f"chosen_by_{criterion}"] = (each.idxmin(axis=1) == name).sum()
+            for criterion, above_lowest in delta.items():
+                row[f"median_delta_{criterion}"] = above_lowest[name].median()
+                row[f"chosen_by_{criterion}"] = (above_lowest.idxmin(axis=1) == name).sum()
             rows.append(row)
     caption = (
         "Simplest adequate model: by how much each model's AIC and BIC exceed the lowest, and in "
@@ -123,7 +125,7 @@ def read_fits(study: Study, path: Path) -> pd.DataFrame:
     return MODEL_FITS.read(path, case=[case.name], model=case.models, seed=seeds_of(path.stem))
 
 
-_COLUMNS = (
+_COVERAGE_COLUMNS = (
     *titled("case", "quantity", "unit"),
     Column("target", "Target", 4),
     Column("bound_percent", "Cramér-Rao bound, rest known %", 3),
@@ -152,19 +154,21 @@ def coverage(
     Targets are files of all cases, in their order; calibrated grippers are named like their case.
     """
     rows: list[Row] = []
-    estimated = pd.concat([read_intervals(study, it) for it in intervals], ignore_index=True)
+    estimated = pd.concat([read_intervals(study, path) for path in intervals], ignore_index=True)
     for (name, case), target in zip(study.cases.items(), targets, strict=True):
-        found = estimated[estimated["case"] == name]
-        own = [file for file in calibrated if file.stem == name]
-        for quantity, limit in bounds_at_truth(case, target, own):
-            mine = found[found["quantity"] == quantity.label]
+        of_case = estimated[estimated["case"] == name]
+        of_calibration = [file for file in calibrated if file.stem == name]
+        for quantity, limit in bounds_at_truth(case, target, of_calibration):
+            mine = of_case[of_case["quantity"] == quantity.label]
             fitted = mine[mine["estimate_rest_known"].notna()]
             shown = mine[mine["verdict"].notna()]
             if fitted.empty and not np.any(shown["verdict"] != NOT_DETERMINED):
                 continue
             truth = quantity_value(quantity.label, case.parameters) or 0.0
             head = {"case": name, "quantity": quantity.label, "unit": quantity.unit}
-            numbers = _spreads(fitted, truth, 100 * limit, case.confidence) | _shown(shown, truth)
+            numbers = _spreads(fitted, truth, 100 * limit, case.confidence) | _verdicts_shown(
+                shown, truth
+            )
             rows.append({**head, "target": truth, **numbers})
     caption = (
         "Least squares over many seeds, for every quantity that a case's traces should determine: "
@@ -177,7 +181,7 @@ def coverage(
         f"in {_judged_seeds(study)}, and how many of them are true; one-sided limits hold more "
         "often than the confidence says."
     )
-    return ShownTable(caption, _COLUMNS, rows)
+    return ShownTable(caption, _COVERAGE_COLUMNS, rows)
 
 
 def bounds_at_truth(
@@ -193,7 +197,9 @@ def bounds_at_truth(
     _, sensitivity = experiment.of(time_s, rotation).residuals(log_truth)
     noise_sd = standard_deviation(rotation, case.noise)
     quantities = parameters_and_sum(experiment.searched)
-    return [(each, least_sd(sensitivity, noise_sd, log_truth, each)) for each in quantities]
+    return [
+        (quantity, least_sd(sensitivity, noise_sd, log_truth, quantity)) for quantity in quantities
+    ]
 
 
 def read_intervals(study: Study, path: Path) -> pd.DataFrame:
@@ -201,17 +207,17 @@ def read_intervals(study: Study, path: Path) -> pd.DataFrame:
 
     Seeds that are judged in full have all quantities.
     """
-    case, found = study.cases[path.parent.name], INTERVALS.read(path)
+    case, frame = study.cases[path.parent.name], INTERVALS.read(path)
     every = [quantity.label for quantity in parameters_and_sum(case.experiment.searched)]
-    estimated = found.loc[found["estimate_rest_known"].notna(), "quantity"].unique()
+    estimated = frame.loc[frame["estimate_rest_known"].notna(), "quantity"].unique()
     often = case.block.identifiability.verdicts_every
     wanted = (
         (case.name, quantity, seed)
         for seed in seeds_of(path.stem)
         for quantity in (estimated if seed % often else every)
     )
-    require_rows(path, found, ("case", "quantity", "seed"), wanted)
-    return found
+    require_rows(path, frame, ("case", "quantity", "seed"), wanted)
+    return frame
 
 
 def _judged_seeds(study: Study) -> str:
@@ -221,12 +227,12 @@ def _judged_seeds(study: Study) -> str:
     return "every seed" if 1 in every else f"one of {every.pop()} seeds"
 
 
-def _spreads(found: pd.DataFrame, truth: float, least_sd: float, confidence: float) -> Row:
+def _spreads(fitted: pd.DataFrame, truth: float, least_sd: float, confidence: float) -> Row:
     """Return bound, spread and coverage of a quantity; nothing of one without intervals."""
-    if found.empty:
+    if fitted.empty:
         return {}
     spread, rest_known = (
-        100 * float(np.std(np.log(found[name].to_numpy(float)), ddof=1))
+        100 * float(np.std(np.log(fitted[name].to_numpy(float)), ddof=1))
         for name in ("estimate", "estimate_rest_known")
     )
     return {
@@ -234,27 +240,27 @@ def _spreads(found: pd.DataFrame, truth: float, least_sd: float, confidence: flo
         "spread_percent": spread,
         "spread_over_bound": spread / least_sd,
         "rest_known_over_bound": rest_known / least_sd,
-        "bias_percent": np.mean(100 * np.log(found["estimate"].to_numpy(float) / truth)),
+        "bias_percent": np.mean(100 * np.log(fitted["estimate"].to_numpy(float) / truth)),
         "confidence_percent": 100 * confidence,
-        "coverage_percent": 100 * np.mean(_holds(found, truth)),
-        "seeds": len(found),
+        "coverage_percent": 100 * np.mean(_holds(fitted, truth)),
+        "seeds": len(fitted),
     }
 
 
-def _shown(found: pd.DataFrame, truth: float) -> Row:
+def _verdicts_shown(judged: pd.DataFrame, truth: float) -> Row:
     """Count verdicts from whole profiles, and the true ones among them."""
-    counts: Row = {"shown_seeds": len(found)}
-    held = _holds(found, truth, "shown_")
+    counts: Row = {"shown_seeds": len(judged)}
+    held = _holds(judged, truth, "shown_")
     for name, verdicts in _COUNTED.items():
-        chosen = found["verdict"].isin(verdicts)
+        chosen = judged["verdict"].isin(verdicts)
         counts[f"shown_{name}"] = int(np.sum(chosen))
         counts[f"shown_{name}_true"] = int(np.sum(held[chosen]))
     return counts
 
 
-def _holds(found: pd.DataFrame, truth: float, which: str = "") -> "pd.Series[bool]":
+def _holds(limits: pd.DataFrame, truth: float, which: str = "") -> "pd.Series[bool]":
     """Return whether limits hold the true value, (n_rows,); an open side does."""
-    low, high = found[f"{which}low"].fillna(0.0), found[f"{which}high"].fillna(np.inf)
+    low, high = limits[f"{which}low"].fillna(0.0), limits[f"{which}high"].fillna(np.inf)
     return low.le(truth) & high.ge(truth)
 
 
@@ -274,11 +280,11 @@ _COUNT_COLUMNS = (
 def verdict_counts(study: Study, intervals: list[Path]) -> ShownTable:
     """Count verdicts of whole profiles, and those whose limits hold the true value."""
     rows: list[Row] = []
-    estimated = pd.concat([read_intervals(study, it) for it in intervals], ignore_index=True)
+    estimated = pd.concat([read_intervals(study, path) for path in intervals], ignore_index=True)
     for name, case in study.cases.items():
-        found = estimated[estimated["case"] == name]
+        of_case = estimated[estimated["case"] == name]
         for quantity in parameters_and_sum(case.experiment.searched):
-            mine = found[(found["quantity"] == quantity.label) & found["verdict"].notna()]
+            mine = of_case[(of_case["quantity"] == quantity.label) & of_case["verdict"].notna()]
             target = quantity_value(quantity.label, case.parameters)
             head: Row = {"case": name, "quantity": quantity.label, "unit": quantity.unit}
             rows += [head | row for row in _counts(mine, target)]
@@ -291,11 +297,11 @@ def verdict_counts(study: Study, intervals: list[Path]) -> ShownTable:
     return ShownTable(caption, _COUNT_COLUMNS, rows)
 
 
-def _counts(found: pd.DataFrame, target: float | None) -> Iterator[Row]:
-    for verdict, mine in found.groupby("verdict"):
+def _counts(judged: pd.DataFrame, target: float | None) -> Iterator[Row]:
+    for verdict, mine in judged.groupby("verdict"):
         count = len(mine)
-        row: Row = {"target": target, "verdict": verdict, "seeds": len(found), "reached": count}
-        row |= _interval("reached", count, len(found))
+        row: Row = {"target": target, "verdict": verdict, "seeds": len(judged), "reached": count}
+        row |= _interval("reached", count, len(judged))
         if verdict == DETERMINED:
             row["narrow"] = np.sum(mine["shown_high"] <= WIDE**2 * mine["shown_low"])
         if verdict != NOT_DETERMINED and target is not None:

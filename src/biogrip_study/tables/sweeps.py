@@ -1,6 +1,6 @@
 """Points of a sweep: errors of what is identified, and the share of seeds in the true basin.
 
-`judge` writes them, a row per point, method and quantity; a table and heat maps share them.
+`judge_points` writes them, a row per point, method and quantity; a table shows some.
 """
 
 import math
@@ -23,7 +23,7 @@ from biogrip_study.methods.genome import nearest_encodable
 from biogrip_study.methods.registry import METHODS
 from biogrip_study.records.identifications import near_noise, near_noise_words, read_batch
 from biogrip_study.records.rows import RowFile
-from biogrip_study.tables.layout import Column, Row, ShownTable, write
+from biogrip_study.tables.layout import Column, Row, ShownTable
 
 POINTS = RowFile(
     "a sweep",
@@ -36,10 +36,10 @@ POINTS = RowFile(
 )
 
 # Log factor, and multiple of the bound, within which a value is in the basin of the truth.
-_FACTOR, _BOUNDS = math.log(2), 4.0
+_FACTOR, _BOUNDS_OF_BASIN = math.log(2), 4.0
 
 
-def judge(
+def judge_points(
     study: Study, sweep: str, identifications: list[Path], calibrated: list[Path], points: Path
 ) -> None:
     """Compute errors and shares of successful seeds at every point of a sweep.
@@ -59,34 +59,36 @@ def judge(
             case = study.points[point.name]
             problem = with_calibration(case.experiment, calibrations.get(point.name, []))
             bounds[point.name] = bounds_percent(problem, case.noise, true, case.times_s)
-        heads = headlines([(q.label, percent) for found in bounds.values() for q, percent in found])
+        heads = headlines(
+            [(q.label, percent) for of_point in bounds.values() for q, percent in of_point]
+        )
         for point, method in product(grid, study.config.methods):
             case = study.points[point.name]
-            found = pd.concat([read_batch(path, case) for path in files[point.name, method]])
+            runs = pd.concat([read_batch(path, case) for path in files[point.name, method]])
             if case.noise.absent:
                 # Without noise, the misfit of the true values rounded to the genes' digits.
-                found = found.assign(noise_rms=_resolution(case, true))
-            near = float(np.mean(near_noise(found, study.near_noise_tolerance)))
+                runs = runs.assign(noise_rms=_resolution(case, true))
+            near = float(np.mean(near_noise(runs, study.near_noise_tolerance)))
             head = point.name, point.row.shown, point.column.shown, method
-            judged = _judged(case, true, found, bounds[point.name], heads, near)
-            rows += ((*head, *own) for own in judged)
+            judged = _judged(case, true, runs, bounds[point.name], heads, near)
+            rows += ((*head, *numbers) for numbers in judged)
     POINTS.write(points, rows)
 
 
 def _judged(
     point: Case,
     true: Mapping[str, float],
-    found: pd.DataFrame,
+    runs: pd.DataFrame,
     bounds: list[tuple[Quantity, float]],
     heads: list[str],
     near: float,
 ) -> Iterator[tuple[str | int, ...]]:
     searched = point.experiment.searched.parameters
-    errors, inside = {}, np.ones(len(found), dtype=bool)
+    errors, inside = {}, np.ones(len(runs), dtype=bool)
     for q, percent in bounds:
         members = [searched[index] for index in q.members]
         truth = sum(true[p.name] for p in members)
-        values = found[[p.column for p in members]].sum(axis=1).to_numpy(float)
+        values = runs[[p.column for p in members]].sum(axis=1).to_numpy(float)
         errors[q.label] = 100 * np.abs(values - truth) / (truth or np.nan)
         if q.label in heads:
             inside &= in_basin(values, truth, percent / 100)
@@ -95,7 +97,7 @@ def _judged(
         medians = [np.median(some) if len(some) else np.nan for some in (every, every[inside])]
         share = float(np.mean(inside)) if heads else np.nan
         numbers = (near, share, *medians, percent)
-        yield q.label, len(found), *("" if np.isnan(it) else f"{it:.6g}" for it in numbers)
+        yield q.label, len(runs), *("" if np.isnan(x) else f"{x:.6g}" for x in numbers)
 
 
 def in_basin(values: Array, truth: float, bound: float) -> BoolArray:
@@ -106,7 +108,7 @@ def in_basin(values: Array, truth: float, bound: float) -> BoolArray:
     """
     with np.errstate(divide="ignore"):
         away = np.abs(np.log(values / truth))
-    return away <= np.fmax(_FACTOR, _BOUNDS * bound)
+    return away <= np.fmax(_FACTOR, _BOUNDS_OF_BASIN * bound)
 
 
 def _resolution(point: Case, true: Mapping[str, float]) -> float:
@@ -127,26 +129,6 @@ def _resolution(point: Case, true: Mapping[str, float]) -> float:
     return rms(both[1] - both[0])
 
 
-def axis_title(study: Study, axis: AxisBlock) -> str:
-    """Return the title of an axis with its unit, marked if the paper does not give the values."""
-    keys = {f"{key}." for value in axis.levels for key in value.overrides}
-    reconstructed = tuple(f"{name}." for name in study.config.reconstructed)
-    return axis.title + ", reconstructed" * any(key.startswith(reconstructed) for key in keys)
-
-
-def read_points(path: Path, sweep: str, case: str) -> pd.DataFrame:
-    """Read the judged points of a case in a sweep."""
-    found = POINTS.read(path)
-    return found[found["point"].str.startswith(f"{case}--{sweep}--")]
-
-
-def headlines_of(points: pd.DataFrame) -> list[str]:
-    """Return the best and the worst determined quantity of a case, see `headlines`."""
-    first = points[points["method"] == points["method"].iloc[0]]
-    pairs = zip(first["quantity"], first["bound_percent"].astype(float), strict=True)
-    return headlines(list(pairs))
-
-
 # By column of points: name and heading of the columns that the table has for every method.
 _BY_METHOD = {
     "near_noise_share": ("near_noise", "Share {near_noise}"),
@@ -156,69 +138,64 @@ _BY_METHOD = {
 }
 # Errors, and the least that is told without noise, where rounding decides how a fit ends.
 _ERRORS, _LEAST_PERCENT = [name for name in _BY_METHOD if "error" in name], 1.0
+_CAPTION = (
+    "{title}: of every case the best and the worst determined quantity. In the basin of the truth "
+    "are seeds within a factor of two of it, or four times the bound if that is more, in both. "
+    "Bound is the standard deviation that noise leaves at least, to first order and with "
+    "parameters without information taken as known; the median absolute error of an estimator that "
+    "attains it is 0.67 of that. Without noise, the misfit of the truth rounded to two digits "
+    f"stands for the noise, and errors below {_LEAST_PERCENT:g} % are given as that: rounding "
+    "decides where these fits end."
+)
 
 
-def write_robustness(study: Study, sweep: str, points: Path, table: Path) -> None:
-    """Write the table of a sweep."""
-    write(robustness(study, sweep, points), table)
-
-
-def robustness(study: Study, name: str, points: Path) -> ShownTable:
-    """Join the points of a sweep over all its cases."""
-    sweep = study.config.sweeps[name]
-    methods = [METHODS[method] for method in study.config.methods]
+def robustness(study: Study, sweep: str, points: Path) -> ShownTable:
+    """Return a row for each point of a sweep and the best and worst determined quantity."""
+    block, frame = study.config.sweeps[sweep], POINTS.read(points)
+    frame["case"] = frame["point"].str.partition("--")[0]
+    silent = frame["bound_percent"].isna()
+    frame.loc[silent, _ERRORS] = frame.loc[silent, _ERRORS].clip(lower=_LEAST_PERCENT)
     rows: list[Row] = []
-    for case in sweep.cases:
-        found = read_points(points, name, case)
-        for quantity in headlines_of(found):
-            chosen = found[found["quantity"] == quantity]
-            for (row, column), group in chosen.groupby(["row", "column"], sort=False):
-                by_method = group.set_index("method")
-                if by_method["bound_percent"].isna().all():
-                    by_method[_ERRORS] = by_method[_ERRORS].clip(lower=_LEAST_PERCENT)
-                head = {
-                    "case": case,
-                    "row": row,
-                    "column": column,
-                    "quantity": quantity,
-                    "bound_percent": float(by_method["bound_percent"].iloc[0]),
+    for case in block.cases:
+        of_case = frame[frame["case"] == case]
+        first = of_case[of_case["method"] == study.shown_method.name]
+        for quantity in headlines([*zip(first["quantity"], first["bound_percent"], strict=True)]):
+            chosen = of_case[of_case["quantity"] == quantity]
+            for _, at_point in chosen.groupby("point", sort=False):
+                row = at_point.iloc[0][["case", "row", "column", "quantity", "bound_percent"]]
+                by_method = {
+                    f"{ours}_{method}": values[theirs]
+                    for method, values in at_point.set_index("method").iterrows()
+                    for theirs, (ours, _) in _BY_METHOD.items()
                 }
-                rows.append(
-                    head
-                    | {
-                        f"{ours}_{it.name}": float(by_method.loc[it.name, theirs])
-                        for theirs, (ours, _) in _BY_METHOD.items()
-                        for it in methods
-                    }
-                )
+                rows.append(row.to_dict() | by_method)
     words = near_noise_words(study.near_noise_tolerance)
     columns = (
         Column("case", "Case"),
-        Column("row", _title(study, sweep.rows)),
-        Column("column", _title(study, sweep.columns)),
+        Column("row", _axis_heading(study, block.rows)),
+        Column("column", _axis_heading(study, block.columns)),
         Column("quantity", "Quantity"),
         *(
-            Column(f"{ours}_{it.name}", f"{heading.format(near_noise=words)}, {it.title}", 2)
+            Column(
+                f"{ours}_{method}",
+                f"{heading.format(near_noise=words)}, {METHODS[method].title}",
+                2,
+            )
             for ours, heading in _BY_METHOD.values()
-            for it in methods
+            for method in study.config.methods
         ),
         Column("bound_percent", "Bound, rest known %", 2),
     )
-    caption = (
-        f"{sweep.title or name}: of every case the best and the worst determined quantity. In the "
-        "basin of the truth are seeds within a factor of two of it, or four times the bound if "
-        "that is more, in both. Bound is the standard deviation that noise leaves at least, to "
-        "first order and with parameters without information taken as known; the median absolute "
-        "error of an estimator that attains it is 0.67 of that. Without noise, the misfit of the "
-        "truth rounded to two digits stands for the noise, and errors below "
-        f"{_LEAST_PERCENT:g} % are given as that: rounding decides where these fits end."
-    )
+    caption = _CAPTION.format(title=block.title or sweep)
     marked = [key for key in study.config.reconstructed if key.split(".")[0] == "gripper"]
     if marked:
         caption += f" Reconstructed, as the paper does not give them: {', '.join(marked)}."
     return ShownTable(caption, columns, rows)
 
 
-def _title(study: Study, axis: AxisBlock) -> str:
-    title = axis_title(study, axis)
-    return title[:1].upper() + title[1:]
+def _axis_heading(study: Study, axis: AxisBlock) -> str:
+    """Return the title of an axis with its unit, marked if the paper does not give the values."""
+    keys = {f"{key}." for value in axis.levels for key in value.overrides}
+    reconstructed = tuple(f"{name}." for name in study.config.reconstructed)
+    marked = ", reconstructed" * any(key.startswith(reconstructed) for key in keys)
+    return axis.title[:1].upper() + axis.title[1:] + marked

@@ -1,0 +1,122 @@
+"""Where a tip touches its sample, fitted along with the sample, or doubted.
+
+A depth that counts from a wrong zero is off by one length throughout, d -> d + d0. A scan with what
+any linear sample may do finds d0 roughly; least squares of sample and d0 then find both. Limits of
+the sample allow for any d0, to first order (`biogrip.fit.trace_fit.contact_function`), and d0 has
+limits of first order.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from scipy.special import chdtri, stdtrit
+
+import biogrip.levels as levels
+from biogrip.arrays import Array
+from biogrip.digits import plain
+from biogrip.fit.any_sample import fit_responses, spread_lags
+from biogrip.fit.experiment import Experiment
+from biogrip.fit.least_squares import identify_many
+from biogrip.fit.noise_model_fit import absorbed
+from biogrip.fit.problem import silent
+from biogrip.fit.trace_fit import contact_function
+from biogrip.judging.diagnosis import Diagnosis
+from biogrip.judging.doubts import DOUBT, REJECTED, REJECTION, Note
+from biogrip.physics.modes import lag_course
+from biogrip.physics.noise import without
+from biogrip.traces.reader import Recording
+
+# Contacts that are tried, up to this share of the largest depth off; lags a decade; most steps.
+_DEPTHS_TRIED, _FURTHEST, _LAGS_OF_CONTACT, _MOST_EVALUATIONS = 41, 0.5, 2, 50
+
+
+def with_contact(experiment: Experiment, recording: Recording) -> Experiment:
+    """Return an experiment whose tip is as deep as fits best, of a trace with times from 0."""
+    assert experiment.record is not None
+    assert experiment.tip_power is not None
+    time_s, readings = recording.time_s, recording.readings
+    deepest = float(experiment.record[:, 1].max()) ** (1 / experiment.tip_power)
+    lags = spread_lags(experiment.torque, time_s, _LAGS_OF_CONTACT)
+    nuisance = experiment.nuisance(time_s)
+
+    def rest(deeper: float) -> float:
+        course = replace(experiment, deeper=deeper).torque
+        responses = without(nuisance, lag_course(course, lags, time_s))
+        return fit_responses(without(nuisance, readings), responses)[1]
+
+    tried = deepest * np.linspace(-_FURTHEST, _FURTHEST, _DEPTHS_TRIED)
+    guess = replace(experiment, deeper=float(min(tried, key=rest)))
+    return replace(experiment, deeper=_fitted(guess, time_s, readings))
+
+
+def _fitted(guess: Experiment, time_s: Array, readings: Array) -> float:
+    """Fit depth and sample, beginning with a guess of the depth."""
+    # Imported here: loading it takes longer than a short job.
+    from scipy.optimize import least_squares
+
+    exact = guess.to_identify()
+    problem = exact.of(time_s, readings)
+    (found,) = identify_many([problem], exact.least_squares, [np.random.default_rng(0)], silent)
+    depth, noise = abs(guess.deeper) + 1e-3, problem.residuals.noise_scale
+
+    def at(x: Array) -> tuple[Experiment, Array, Array]:
+        moved = replace(exact, deeper=guess.deeper + depth * x[-1])
+        residuals = replace(problem.residuals, course=moved.torque)
+        return moved, *residuals(x[:-1])
+
+    def slopes(x: Array) -> Array:
+        moved, _, rows = at(x)
+        by_depth = contact_function(moved, time_s, np.exp(x[:-1]))
+        cleared = problem.residuals.trace.condensed.cleared(depth * by_depth)
+        return np.vstack((rows, cleared)).T / noise
+
+    start = np.append(np.log(found.parameters), 0.0)
+    ends = np.append(problem.low, -np.inf), np.append(problem.high, np.inf)
+    fit = least_squares(lambda x: at(x)[1] / noise, start, slopes, ends, max_nfev=_MOST_EVALUATIONS)
+    return guess.deeper + depth * float(fit.x[-1])
+
+
+def depth_off(diagnosis: Diagnosis) -> tuple[float, float]:
+    """Return by how much a tip would be deeper than it was taken to be, to first order, and its sd.
+
+    It is that which what the fit leaves, in white noise, tells beside the sample's parameters.
+    """
+    recording, experiment = diagnosis.identified
+    likelihood, exact = diagnosis.likelihood, experiment.to_identify()
+    residuals = exact.of(recording.time_s, recording.readings).residuals
+    left, slopes = residuals(likelihood.best)
+    change = contact_function(exact, recording.time_s, np.exp(likelihood.best))
+    change = residuals.trace.condensed.cleared(change)
+    basis = absorbed(np.vstack((slopes, residuals.trace.condensed.taken)))
+    alone = without(basis, change)
+    told = float(alone @ alone)
+    if told <= levels.CONSTANT_OF_PEAK**2 * float(change @ change):
+        return 0.0, np.inf
+    return -float(alone @ left) / told, likelihood.noise_sd / float(np.sqrt(told))
+
+
+def depth_limits(diagnosis: Diagnosis) -> tuple[float, float, float]:
+    """Return by how much a tip is deeper than recorded, in m, and its limits."""
+    recording, experiment = diagnosis.identified
+    _, sd = depth_off(diagnosis)
+    freedom = min(diagnosis.likelihood.freedom, 1e9)
+    room = sd * float(stdtrit(freedom, 0.5 + diagnosis.likelihood.confidence / 2))
+    unit = recording.read.instrument.controlled.units["m"]
+    middle = experiment.deeper
+    return middle / unit, (middle - room) / unit, (middle + room) / unit
+
+
+def notes_on_contact(diagnosis: Diagnosis) -> Iterator[Note]:
+    """Yield a doubt if what a fit leaves follows the derivative by the contact, which was given."""
+    recording, experiment = diagnosis.identified
+    if experiment.tip_power is None or experiment.fit_contact:
+        return
+    deeper, sd = depth_off(diagnosis)
+    if (deeper / sd) ** 2 < chdtri(1, levels.FALSE_ALARM):
+        return
+    size_nm = 1e9 * abs(deeper) / recording.read.instrument.controlled.units["m"]
+    side = "before" if deeper > 0 else "after"
+    text = f"The tip seems to touch about {plain(size_nm, 2)} nm {side} the zero of its depth"
+    rejected = diagnosis.status == REJECTED
+    yield Note(REJECTION if rejected else DOUBT, f"{text}: say --contact fit.")

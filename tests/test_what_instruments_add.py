@@ -1,0 +1,154 @@
+"""A zero, a rise, a contact, a share: by the command, of traces that are simulated by hand."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from biogrip.arrays import Array
+from tests.helpers.identified import by_quantity, identified, identify, write_trace
+
+K, K_P, TAU_S = 80.0, 100.0, 20.0
+AFTER_S: Array = np.arange(1.0, 201.0) * 0.5
+RELAXATION = ("--model", "zener_maxwell", "--no-compare", "--start", "0")
+
+
+def modulus(time_s: Array) -> Array:
+    return K_P + K * np.exp(-time_s / TAU_S)
+
+
+def noise(count: int, sd: float) -> Array:
+    return sd * np.random.default_rng(6).standard_normal(count)
+
+
+def holds(found: dict, **true: float) -> None:  # type: ignore[type-arg]
+    """Twice as wide as 95 % limits, what is said holds the truth."""
+    limits = by_quantity(found)
+    for name, value in true.items():
+        low, high = limits[name]["low"], limits[name]["high"]
+        assert low - (high - low) / 2 < value < high + (high - low) / 2, limits[name]
+
+
+def test_rows_before_the_start_tell_the_zero(tmp_path: Path) -> None:
+    """Off by 5 % of the peak, k_p would be off by 9 %."""
+    before = np.arange(-30, 1) * 0.5
+    clean = np.append(np.zeros(len(before)), modulus(AFTER_S))
+    readings = clean + noise(len(clean), 1.8) + 9.0
+    trace = tmp_path / "zero.csv"
+    write_trace(trace, np.append(before, AFTER_S), readings, header="time_s,modulus_Pa")
+    found = identified(tmp_path, trace, "--reading", "modulus", *RELAXATION)
+    holds(found, k=K, k_p=K_P, tau=TAU_S)
+    (said,) = (note["text"] for note in found["notes"] if "Zero from" in note["text"])
+    assert said.startswith("Zero from 29 rows before the strain: ")
+    known = identified(
+        tmp_path, trace, "--reading", "modulus", *RELAXATION, "--set", "measurement.offset=false"
+    )
+    assert "offset_rad" not in known
+
+
+def test_a_rise_that_is_told_moves_nothing(tmp_path: Path) -> None:
+    """The hereditary integral of a ramp of 4 s, by hand; taken for a step, k is off by 10 %."""
+    inside = np.minimum(AFTER_S, 4.0)
+    spring = TAU_S / 4 * (np.exp(-(AFTER_S - inside) / TAU_S) - np.exp(-AFTER_S / TAU_S))
+    stress = K_P * inside / 4 + K * spring + noise(200, 1.0)
+    trace = write_trace(tmp_path / "rise.csv", AFTER_S, stress, header="time_s,stress_Pa")
+    given = ("--reading", "stress", "--hold", "1", *RELAXATION)
+    found = identified(tmp_path, trace, *given, "--ramp", "4s")
+    assert found["fit"] == "ok"
+    holds(found, k=K, k_p=K_P, tau=TAU_S)
+    assert "reached within 4 s" in found["load"]
+    assert identified(tmp_path, trace, *given)["fit"] != "ok"
+
+
+def test_of_a_modulus_readings_within_the_rise_are_left_out(tmp_path: Path) -> None:
+    inside = np.minimum(AFTER_S, 4.0)
+    spring = TAU_S / inside * (np.exp(-(AFTER_S - inside) / TAU_S) - np.exp(-AFTER_S / TAU_S))
+    readings = K_P + K * spring + noise(200, 1.0)
+    trace = write_trace(tmp_path / "rise.csv", AFTER_S, readings, header="time_s,modulus_Pa")
+    found = identified(tmp_path, trace, "--reading", "modulus", *RELAXATION, "--ramp", "4000 ms")
+    # The reading at the end of the rise may be of either side.
+    assert found["samples"] == 192
+    holds(found, k=K, k_p=K_P, tau=TAU_S)
+
+
+def test_a_rise_goes_with_a_hold(tmp_path: Path) -> None:
+    columns = AFTER_S, modulus(AFTER_S), np.ones(200)
+    trace = write_trace(tmp_path / "rise.csv", *columns, header="time_s,stress_Pa,strain")
+    given = (trace, "--reading", "stress", "--load", "strain", *RELAXATION)
+    status, _, complained = identify(*given, "--ramp", "4s")
+    assert status
+    assert "--ramp: goes with --hold" in complained
+    for wrong in ("0s", "4 Pa", "fast"):
+        with pytest.raises(SystemExit):
+            identify(*given, "--ramp", wrong)
+    given = (trace, "--reading", "stress", "--hold", "1", *RELAXATION)
+    status, _, complained = identify(*given, "--ramp", "200s")
+    assert status
+    assert "--ramp: found 200 s, allowed is less than the trace's 100 s" in complained
+
+
+def test_deviations_that_are_a_share_of_each_reading_are_of_the_smooth_course(
+    tmp_path: Path,
+) -> None:
+    """Weighted by their own noise of 15 %, readings would be too low by 4.5 %: three limits."""
+    means = []
+    for seed in range(4):
+        scatter = 1 + 0.15 * np.random.default_rng(seed).standard_normal(200)
+        readings = modulus(AFTER_S) * scatter
+        columns = AFTER_S, readings, np.round(0.15 * readings, 2)
+        trace = tmp_path / "share.csv"
+        write_trace(trace, *columns, header="time_s,modulus_Pa,sd_Pa")
+        found = identified(tmp_path, trace, "--reading", "modulus", "--sd", "sd_Pa", *RELAXATION)
+        assert any("15 % of each reading" in note["text"] for note in found["notes"])
+        means.append(by_quantity(found)["k_p"]["value"])
+    # Their standard deviation is 1.5 % together.
+    assert abs(np.mean(means) / K_P - 1) < 0.04
+
+
+RADIUS_M, OFF_M = 2.5e-6, 60e-9
+SPHERE = ("--reading", "force=force_N", "--load", "depth_m", "--sphere", "2.5 um")
+
+
+def approach(off_m: float, name: Path) -> Path:
+    """Approach with 2 um/s to 500 nm, then dwell: Hertz's hereditary integral, by hand."""
+    time_s = np.arange(0, 15, 0.025)
+    depth_m = np.minimum((time_s - 0.5) * 2e-6, 5e-7)
+    force = []
+    for now in time_s:
+        s = np.linspace(0.5, np.clip(now, 0.5, 0.75), 1001)
+        rate = 1.5 * np.sqrt((s - 0.5) * 2e-6) * 2e-6
+        relaxed = 800 + 1200 * np.exp(-(now - s) / 3.0)
+        force.append(16 / 9 * np.sqrt(RADIUS_M) * np.trapezoid(relaxed * rate, s))
+    read = np.array(force) + 1.2e-10 + noise(len(time_s), 8e-12)
+    return write_trace(name, time_s, read, depth_m - off_m, header="time_s,force_N,depth_m")
+
+
+def test_a_contact_is_fitted_with_baseline_and_sample(tmp_path: Path) -> None:
+    trace = approach(OFF_M, tmp_path / "afm.csv")
+    given = (*SPHERE, "--model", "zener_maxwell", "--no-compare")
+    found = identified(tmp_path, trace, *given, "--contact", "fit")
+    assert found["fit"] == "ok"
+    holds(found, k=1200.0, k_p=800.0, tau=3.0)
+    low, high = found["contact_limits_m"]
+    assert low - (high - low) / 2 < OFF_M < high + (high - low) / 2
+    assert high - low < 20e-9
+    doubted = identified(tmp_path, trace, *given)
+    assert doubted["fit"] != "ok"
+    assert any("say --contact fit" in reason for reason in doubted["reasons"])
+
+
+def test_a_right_contact_is_not_doubted(tmp_path: Path) -> None:
+    trace = approach(0.0, tmp_path / "afm.csv")
+    found = identified(tmp_path, trace, *SPHERE, "--model", "zener_maxwell", "--no-compare")
+    assert found["fit"] == "ok"
+    holds(found, k=1200.0, k_p=800.0, tau=3.0)
+
+
+def test_of_a_dwell_alone_nothing_tells_the_contact(tmp_path: Path) -> None:
+    trace = write_trace(tmp_path / "dwell.csv", AFTER_S, AFTER_S, header="time_s,force_N")
+    given = (trace, "--reading", "force=force_N", "--hold", "500 nm", "--sphere", "2.5 um")
+    status, _, complained = identify(*given, "--contact", "fit")
+    assert status
+    assert "takes the shape of a tip, and a recorded depth (--load)" in complained
+    with pytest.raises(SystemExit):
+        identify(*given, "--contact", "5 nm")
