@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 from itertools import combinations
 
 import numpy as np
-from scipy.special import fdtrc
 
 from biogrip import levels
 from biogrip.arrays import Array
@@ -38,6 +37,9 @@ def are_repeats(places: Array, readings: Array) -> bool:
     bent = means[:, 1:-1] - (1 - later) * means[:, :-2] - later * means[:, 2:]
     of_noise = 1 / counts[1:-1] + (1 - later) ** 2 / counts[:-2] + later**2 / counts[2:]
     about_lines = np.mean(bent**2 / of_noise, axis=1)
+    # Imported here: it takes longer than many a job, and few files have rows of several conditions.
+    from scipy.special import fdtrc
+
     chances = fdtrc(more, free, within / np.maximum(about_lines, np.finfo(float).tiny))
     return bool(np.all(chances > levels.CONDITIONS / len(chances)))
 
