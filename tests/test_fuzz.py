@@ -1,16 +1,21 @@
 """Damaged files: each command gives an answer or one message, and no traceback."""
 
 import re
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from biogrip.cli import main
+from biogrip.command.files import _made_from
+from biogrip.command.outputs import check_outputs, read_result
 from biogrip.command.settings import Asked, check_settings
 from biogrip.command.sheet import is_table, read_table
+from biogrip.config.loading import trace_defaults
 from biogrip.errors import BiogripError
-from tests.helpers.identified import identify
+from biogrip.terminal import visible_lines
+from tests.helpers.identified import identify, write_drop
 from tests.helpers.places import EXAMPLE
 
 pytestmark = [pytest.mark.nightly, pytest.mark.filterwarnings("error")]
@@ -118,3 +123,98 @@ def test_a_damaged_sheet_asks_for_traces_or_is_refused(tmp_path: Path) -> None:
             said = str(error)
         assert len(said.splitlines()) <= 11, seed
         assert is_table(Asked(tmp_path / "cells.csv")) in (True, False), seed
+
+
+MARKS_OF_YAML = ["[", "]", "{", "}", ": ", "- ", "&a ", "*a", "? ", "|", "\t", "\0", "\x1b", "<<: "]
+MARKS_OF_YAML += ["é", "\ud800".encode("utf-8", "surrogatepass").decode("latin-1"), '"', "'", "#"]
+MARKS_OF_YAML += [".inf", ".nan", "1e400", "1:30", "010", "null", "yes", "__use_yte__: true\n"]
+
+
+def mixed(seed: int, text: str, marks: list[str]) -> str:
+    """Return text with pieces of itself moved, doubled or lost, and marks put in, maybe often."""
+    rng = np.random.default_rng([88, seed])
+    for _ in range(rng.integers(1, 5)):
+        first, last = sorted(rng.integers(0, len(text) + 1, 2).tolist())
+        way, last = rng.integers(4), min(last, first + 40)
+        mark = str(rng.choice(marks)) * int(rng.choice([1, 1, 1, 3, 3000]))
+        inserted = ["", text[first:last] * 2, mark, text[-40:]][way]
+        text = text[:first] + inserted + text[last:]
+    return text
+
+
+@pytest.mark.parametrize("hundred", range(15))
+def test_a_damaged_config_is_used_or_refused(tmp_path: Path, hundred: int) -> None:
+    config, text = tmp_path / "lab.yaml", trace_defaults().read_text()
+    (tmp_path / "a.csv").write_text("time_s,rotation_rad\n0,1e-6\n")
+    for seed in range(FILES * hundred, FILES * (hundred + 1)):
+        config.write_text(mixed(seed, text, MARKS_OF_YAML), errors="surrogateescape")
+        said = ""
+        try:
+            check_settings([Asked(tmp_path / "a.csv", config)])
+        except BiogripError as error:
+            said = visible_lines(error)
+        assert len(said.splitlines()) <= 11, seed
+        assert "\x1b" not in said, seed
+
+
+OPTIONS = ["--time", "--reading", "--hold", "--load", "--sphere", "--start", "--from", "--until"]
+OPTIONS += [
+    "--model",
+    "--fix",
+    "--at",
+    "--noise",
+    "--noise-share",
+    "--sd",
+    "--noise-model",
+    "--set",
+]
+GIVEN = [
+    "measurement.time_unit=ms",
+    "strain=A 1",
+    "k_p=0",
+    "1,10,100",
+    "20 pN",
+    "2.5 um",
+    "maxwell",
+]
+GIVEN += ["protocol.phases=[{duration_s: 1, torque_Nm: 1e-9}]", "fit", "time_s", "-3", "0.1"]
+
+
+@pytest.mark.parametrize("hundred", range(5))
+def test_options_of_any_kind_end_with_one_message(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], hundred: int
+) -> None:
+    """Of a trace that is refused in the end, so that none is fitted."""
+    (trace := tmp_path / "a.csv").write_text("time_s,rotation_rad\n0,1e-6\n")
+    for seed in range(FILES * hundred, FILES * (hundred + 1)):
+        rng = np.random.default_rng([89, seed])
+        options: list[str] = []
+        for option in rng.choice(OPTIONS, rng.integers(1, 4)):
+            given = mixed(seed + len(options), str(rng.choice(GIVEN)), [*MARKS_OF_YAML, "\udce9"])
+            options.append(f"{option}={given}")
+        try:
+            status = main(["identify", str(trace), *options])
+        except SystemExit as ended:
+            status = int(str(ended.code))
+        said, text = capsys.readouterr()
+        assert status in (1, 2), (seed, options)
+        assert "Traceback" not in text, (seed, options)
+        assert "fault of biogrip" not in text, (seed, options)
+        assert "\x1b" not in said + text, (seed, options)
+
+
+def test_a_damaged_result_is_refused(tmp_path: Path, few: Path) -> None:
+    """Or was not changed but in how it is written."""
+    write_drop(tmp_path / "a.csv", 0)
+    assert identify(tmp_path / "a.csv", "--config", few)[0] == 0
+    result = tmp_path / "a.identified.json"
+    text, made_from = result.read_text(), _made_from(Asked(tmp_path / "a.csv", few))
+    whole = read_result(result, made_from)
+    for seed in range(2 * FILES):
+        result.write_text(mixed(seed, text, MARKS_OF_YAML))
+        changed = None
+        with suppress(BiogripError):
+            changed = read_result(result, made_from)
+        assert changed in (None, whole), seed
+        with suppress(BiogripError):
+            check_outputs([("a.csv", result)], [])

@@ -1,3 +1,4 @@
+import os
 import signal
 import subprocess
 import sys
@@ -59,6 +60,29 @@ def test_it_says_so_in_a_line_and_leaves_nothing(tmp_path: Path, place: str) -> 
     told = f"biogrip: {how}; no file was left half-written.\n"
     assert ended(code, tmp_path) == (128 + number, "said before\n", told)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_is_on_the_disk_before_it_has_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And then its name: both are really done, and only the order is noted."""
+    done: list[tuple[str, str]] = []
+    fsync, replace = os.fsync, os.replace
+
+    def noted_fsync(opened: int) -> None:
+        done.append(("on the disk", os.readlink(f"/proc/self/fd/{opened}")))
+        fsync(opened)
+
+    def noted_replace(scratch: Path, path: Path) -> None:
+        done.append(("named", str(path)))
+        replace(scratch, path)
+
+    monkeypatch.setattr(os, "fsync", noted_fsync)
+    monkeypatch.setattr(os, "replace", noted_replace)
+    file = tmp_path / "found.csv"
+    write_text(file, "a")
+    on_disk = ("on the disk", str(scratch_path(file))), ("on the disk", str(tmp_path))
+    assert done == [on_disk[0], ("named", str(file)), on_disk[1]]
 
 
 def test_a_link_in_the_place_of_a_scratch_file_is_not_followed(tmp_path: Path) -> None:

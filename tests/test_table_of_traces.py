@@ -67,7 +67,8 @@ def refused(path: Path) -> list[str]:
 
 
 def test_a_trace_may_stand_beside_a_table_that_does_not_name_it(here: Path) -> None:
-    assert "the same file to be written twice" in identify("cells.tsv", "other.csv")[2]
+    said = "other.identified.json: would be written for 'other.csv' and for 'other.csv'"
+    assert said in identify("cells.tsv", "other.csv")[2]
     write(here / "cells.tsv", HEADER, OTHER)
     status, printed, _ = identify("usual.csv", "cells.tsv", "--csv", "found.csv")
     assert status == 0
@@ -115,8 +116,8 @@ def test_traces_side_by_side_are_a_row_each(here: Path) -> None:
     assert float(one["k_p value (N/m)"]) == pytest.approx(10, rel=0.05)
     assert float(other["k_p value (N/m)"]) == pytest.approx(5, rel=0.05)
     assert other["fixed"] == "k = 0.001 N/m; c = 0.001 N s/m; c_p = 150 N s/m"
-    assert Path("both.rotation_A_1.identified.json").exists()
-    assert Path("both.A_2_generalized_maxwell_k_0.001_c_0.001_c_p_150.identified.json").exists()
+    assert Path("both.rotation=A 1.identified.json").exists()
+    assert Path(f"both.A%2F2 generalized_maxwell {fixed}.identified.json").exists()
 
 
 def test_all_that_is_wrong_with_a_table_is_said_at_once(tmp_path: Path) -> None:

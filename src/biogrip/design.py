@@ -160,7 +160,7 @@ def design(config: Path, output: Path | None = None) -> None:
     anything.
     """
     output = output or config.with_stem(f"{config.stem}_designed")
-    check_outputs([output], [config])
+    check_outputs([("--output", output)], [config])
     cases, block = read_samples(config)
     try:
         limits, specimens = set_up(cases, block)

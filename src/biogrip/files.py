@@ -18,6 +18,8 @@ from biogrip.terminal import visible
 def atomic_write(path: Path) -> Iterator[Path]:
     """Yield a scratch path beside `path`, and move it into place if no error occurs.
 
+    After a loss of power there is the old file or the new one, whole.
+
     If the file cannot be written, it is a `BiogripError`.
     """
     scratch = scratch_path(path)
@@ -28,7 +30,11 @@ def atomic_write(path: Path) -> Iterator[Path]:
         scratch.unlink(missing_ok=True)
         scratch.touch(exist_ok=False)
         yield scratch
+        _to_disk(scratch)
         os.replace(scratch, path)
+        # Not every system of files does this for a folder.
+        with suppress(OSError):
+            _to_disk(path.parent)
     except OSError as error:
         raise BiogripError(
             f"{visible(path)}: cannot be written: {error.strerror or error}."
@@ -38,6 +44,15 @@ def atomic_write(path: Path) -> Iterator[Path]:
         with suppress(OSError):
             scratch.unlink(missing_ok=True)
         unfinished.discard(str(scratch))
+
+
+def _to_disk(path: Path) -> None:
+    """Wait until a file, or the names in a folder, are on the disk."""
+    opened = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(opened)
+    finally:
+        os.close(opened)
 
 
 def scratch_path(path: Path) -> Path:

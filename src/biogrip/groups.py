@@ -134,7 +134,7 @@ def _check_names(
         raise BiogripError(f"FOUND: {problem}")
     if unit == by:
         raise BiogripError("--unit: found the column of --by; allowed is another, as of dishes.")
-    check_outputs([*filter(None, (table, plot))], [found])
+    check_outputs([("--csv", table), ("--plot", plot)], [found])
     if plot is not None and plot.suffix not in (".png", ".pdf"):
         text = f"found {visible(plot)}; allowed is a name that ends with .png or .pdf."
         raise BiogripError(f"--plot: {text}")

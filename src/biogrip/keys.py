@@ -147,8 +147,10 @@ def adapter(kind: Any) -> TypeAdapter[Any]:
 
 def built(kind: Callable[..., T], block: Any, *, check: bool = False) -> T:
     """Return the object that a plain block describes; if asked, find conflicts of keys, too."""
-    # As JSON, for then pydantic takes blocks for dataclasses and lists for tuples.
-    return adapter(kind).validate_json(json.dumps([block], default=str), context=check)[0]
+    # As JSON, for then pydantic takes blocks for dataclasses and lists for tuples. It refuses bytes
+    # of names that are not valid text.
+    text = json.dumps([block], default=str, ensure_ascii=False).encode("utf-8", "replace")
+    return adapter(kind).validate_json(text, context=check)[0]
 
 
 def plain(value: object) -> Any:

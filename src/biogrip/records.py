@@ -25,7 +25,7 @@ _FORMULA = re.compile(r"'*[=+@\t\r-]")
 _SIGNED = re.compile(r"[+-]\d+(\.\d+)?(e[+-]?\d+)?|-(inf)?")
 # With this end of a line, `csv` puts quotes around both of its characters in a cell.
 _END = "\r\n"
-AGAIN = "It is damaged: delete it, and the same command makes it again."
+AGAIN = "It is damaged: the same command with --forcerun and this file makes it again."
 """What to do about a result that is not as it was written."""
 
 

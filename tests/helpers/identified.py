@@ -33,6 +33,8 @@ def identified(
 ) -> dict[str, Any]:
     """Content of the JSON file."""
     (folder / "config.yaml").write_text(config)
+    # The result of one trace is not replaced by that of another.
+    (folder / "found.json").unlink(missing_ok=True)
     given = ("--config", folder / "config.yaml", "--output", folder / "found.json")
     status, _, complained = identify(trace, *given, *options)
     assert status == 0, complained

@@ -1,4 +1,5 @@
 import random
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ from biogrip_study.records import identifications as found
 from biogrip_study.records.traces import read_measurements, read_target
 from biogrip_study.tables.study import read_fits, read_intervals
 from tests.helpers.default import study_of
-from tests.helpers.runs import TINY
+from tests.helpers.runs import TINY, results_of, snakemake
 
 CASE = "liquid_drop_2"
 READERS: dict[str, Callable[[Path, Any], Any]] = {
@@ -27,6 +28,27 @@ READERS: dict[str, Callable[[Path, Any], Any]] = {
     f"histories/{CASE}.npz": lambda it, _: found.read_histories(it, "genetic", ["best_misfit"]),
     f"measurements/{CASE}/seeds_0-1.npz": lambda it, _: vars(read_measurements(it, [0, 1])),
 }
+
+
+KINDS = [name for name in READERS if name != "identifications/mine.csv"]
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("name", KINDS)
+def test_the_advice_on_a_damaged_result_brings_all_back(
+    tiny: Path, tiny_copy: Path, name: str
+) -> None:
+    """Followed as the message says, whatever Snakemake has removed when it was refused."""
+    file = tiny_copy / "results" / name
+    content = file.read_bytes()
+    file.write_bytes(content[: len(content) // 2])
+    said = snakemake(tiny_copy, "--keep-going", config=TINY, status=1)
+    advised = {*re.findall(r"^biogrip: (results/[^:,\n]*)[:,].* with --forcerun and", said, re.M)}
+    assert advised == {f"results/{name}"}
+    snakemake(tiny_copy, "--forcerun", *advised, config=TINY)
+    ours, theirs = results_of(tiny_copy), results_of(tiny)
+    assert ours.keys() == theirs.keys()
+    assert [file for file in ours if ours[file] != theirs[file]] == []
 
 
 def damaged(content: bytes, rng: random.Random) -> dict[str, bytes]:

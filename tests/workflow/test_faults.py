@@ -1,12 +1,16 @@
+import os
 import shutil
 import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
+import yaml
 
+from tests.helpers.identified import write_drop
 from tests.helpers.places import ROOT
 from tests.helpers.runs import TINY, ran, results_of, snakemake
 
@@ -48,6 +52,85 @@ def test_after_a_kill_the_same_command_ends_with_the_undisturbed_bytes(
     ours, theirs = results_of(tiny_copy), results_of(tiny)
     assert ours.keys() == theirs.keys()
     assert [name for name in ours if ours[name] != theirs[name]] == []
+
+
+def _killed_after(folder: Path, seconds: float, *command: str | Path) -> None:
+    """Kill a command with all its processes, unless it has ended."""
+    process = subprocess.Popen(
+        [sys.executable, *command],
+        cwd=folder,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+    with suppress(subprocess.TimeoutExpired):
+        process.wait(seconds)
+    with suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+
+
+def _files(folder: Path) -> dict[str, bytes]:
+    """Return what is in a folder, but for what a kill has left of unfinished files."""
+    return {it.name: it.read_bytes() for it in folder.iterdir() if not it.name.endswith(".part")}
+
+
+MOMENTS = 20
+
+
+@pytest.mark.parametrize("more", [(), ("--report", "page.html")])
+def test_a_batch_killed_at_any_moment_ends_with_the_undisturbed_bytes(
+    tmp_path: Path, few: Path, more: tuple[str, ...]
+) -> None:
+    """And no trace that had its result loses it."""
+    files = [f"{number}.csv" for number in range(6)]
+    command: list[str | Path] = ["-m", "biogrip", "identify", *files, "--config", few]
+    command += ["--csv", "found.csv", *more]
+
+    def folder_of(name: str) -> Path:
+        (folder := tmp_path / name).mkdir()
+        for seed, file in enumerate(files):
+            write_drop(folder / file, seed)
+        return folder
+
+    undisturbed, began = folder_of("undisturbed"), time.monotonic()
+    ran(undisturbed, sys.executable, *command)
+    lasts_s = time.monotonic() - began
+    for moment in range(MOMENTS):
+        folder = folder_of(str(moment))
+        _killed_after(folder, lasts_s * moment / MOMENTS, *command)
+        assert _files(folder).items() <= _files(undisturbed).items()
+        ran(folder, sys.executable, *command)
+        assert _files(folder) == _files(undisturbed)
+
+
+def test_a_study_killed_at_many_moments_ends_with_the_undisturbed_bytes(
+    tiny: Path, tmp_path: Path
+) -> None:
+    """Each time it goes on from what there is; all its processes are killed at once."""
+    shutil.copy(tiny / "mine.csv", tmp_path)
+    (tmp_path / "overlay.yaml").write_text(yaml.safe_dump(TINY))
+    study: list[str | Path] = ["-m", "snakemake", "-j2", "-s", ROOT / "Snakefile"]
+    study += ["--configfile", "overlay.yaml"]
+    for moment in range(MOMENTS):
+        _killed_after(tmp_path, 4 + moment, *study)
+        ran(tmp_path, sys.executable, *study, "--unlock")
+    ran(tmp_path, sys.executable, *study)
+    theirs = results_of(tiny)
+    ours = {name: it for name, it in results_of(tmp_path).items() if not name.endswith(".part")}
+    assert ours.keys() == theirs.keys()
+    assert [name for name in ours if ours[name] != theirs[name]] == []
+
+
+def test_a_study_runs_in_a_folder_with_a_blank(tmp_path: Path) -> None:
+    """And a quote: by a link to this environment, a table by a job of Snakemake."""
+    folder = tmp_path / "my client's documents"
+    (folder / "study").mkdir(parents=True)
+    (folder / "venv").symlink_to(Path(sys.executable).parents[1])
+    table = "results/tables/gripper.csv"
+    command = (folder / "venv" / "bin" / "python", "-m", "snakemake", "-j1", "-s")
+    ran(folder / "study", *command, ROOT / "Snakefile", "--", table)
+    assert (folder / "study" / table).is_file()
 
 
 def test_what_is_missing_or_locked_is_said_and_made_again(tiny: Path, tiny_copy: Path) -> None:

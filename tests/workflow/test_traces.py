@@ -39,7 +39,10 @@ def lab(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_batches_give_the_table_of_the_command(lab: Path) -> None:
-    (lab / "cells.tsv").write_text("".join(CELLS.splitlines(keepends=True)[:4]))
+    """Of rows with another gripper and another comb, too."""
+    columns = "gripper.arm_length_m\tactuator.thickness_m", "\t", "\t", "1.6e-3\t4.0e-5"
+    rows = zip(CELLS.splitlines(), columns, strict=False)
+    (lab / "cells.tsv").write_text("".join(f"{row}\t{more}\n" for row, more in rows))
     snakemake(lab, "--", TABLE, config=STUDY)
     options = ("--config", "lab.yaml", "--model", "maxwell", "--csv", "found.csv")
     assert main(["identify", "cells.tsv", *options]) == 1

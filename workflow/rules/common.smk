@@ -1,14 +1,20 @@
 """The config, checked, and what the rules are told of it."""
 
+import sys
 from dataclasses import fields
 from functools import cache
 from pathlib import Path
+from shlex import quote
 
 import yaml
 from snakemake.exceptions import WorkflowError
 
 import biogrip_study
 
+# Snakemake puts it into shell commands as it is, and a folder may have a blank in its name. A
+# workflow that has this one as a module, too, may read this twice.
+if not sys.executable.startswith("'"):
+    sys.executable = quote(sys.executable)
 # Rules of one clone and code of another give what neither does.
 TOP = Path(workflow.current_basedir.get_path_or_uri(secret_free=True)).parents[1]
 for package in (TOP / "src" / "biogrip_study", TOP.parent):

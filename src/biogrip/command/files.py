@@ -98,7 +98,8 @@ def identify_files(
     # Errors of options and config concern all traces: they are raised once, here.
     check_settings(every)
     outputs = [output or own.output for own in every] if rows is None else []
-    written = [*outputs, *filter(None, (report, table))]
+    names = [own.name for own in every]
+    written = [*zip(names, outputs, strict=False), ("--report", report), ("--csv", table)]
     check_outputs(written, [*files, *(own.trace for own in every), *filter(None, [config])])
     drawn = report is not None and len(every) <= MOST_DRAWN
     outcome = _identify_traces(every, outputs or None, drawn=drawn)
@@ -253,41 +254,39 @@ def identify_batch(
     refused: dict[str, str] = {}
     outcome = Outcome([], {})
     with Progress(asked[0].name if alone else "", 1 + STEPS, live=alone, quiet=not alone) as told:
-        for index, own in enumerate(asked):
-            with _caught(own, refused):
-                recording, case = read_trace(own)
+        for index, trace in enumerate(asked):
+            with _caught(trace, refused):
+                recording, case = read_trace(trace)
                 if not is_usual(recording):
-                    told.note(form_in_words(own.trace, recording.form))
+                    told.note(form_in_words(trace.trace, recording.form))
                 read[index] = case, prepare(recording, case.judged_experiment)
-        judged = _judge_batch(asked, read, refused, told)
-    said: dict[int, dict[str, Any]] = {}
-    for index, diagnosis in sorted(judged.items()):
-        own, (case, _) = asked[index], read[index]
-        with _caught(own, refused):
-            said[index] = data_of(diagnosis, case, own.name, own.given)
-    for index, data in said.items():
-        own, diagnosis = asked[index], judged[index]
-        outcome.found.append(data)
-        if outputs is not None:
-            write_result(outputs[index], data, made_from[index])
-        if drawn:
-            # Imported here: loading Matplotlib takes long.
-            from biogrip.command.page import trace_pictures
+        results: dict[int, dict[str, Any]] = {}
+        for index, diagnosis in _diagnosed(asked, read, refused, told):
+            trace = asked[index]
+            with _caught(trace, refused):
+                results[index] = data_of(diagnosis, read[index][0], trace.name, trace.given)
+            if index in results and outputs is not None:
+                write_result(outputs[index], results[index], made_from[index])
+            if index in results and drawn:
+                # Imported here: loading Matplotlib takes long.
+                from biogrip.command.page import trace_pictures
 
-            # What is found counts without a picture, too.
-            with _caught(own, {}):
-                outcome.pictures[own.name] = trace_pictures(diagnosis, data)
-    outcome.refused.update((own.name, refused[own.name]) for own in asked if own.name in refused)
+                # What is found counts without a picture, too.
+                with _caught(trace, {}):
+                    outcome.pictures[trace.name] = trace_pictures(diagnosis, results[index])
+    outcome.found.extend(results[index] for index in sorted(results))
+    names = [trace.name for trace in asked]
+    outcome.refused.update((name, refused[name]) for name in names if name in refused)
     return outcome
 
 
-def _judge_batch(
+def _diagnosed(
     asked: Sequence[Asked],
     read: Mapping[int, tuple[SampleCase, Trace]],
     refused: dict[str, str],
     progress: Progress,
-) -> dict[int, Diagnosis]:
-    """Return diagnoses of traces by their places, and add messages on those that fail."""
+) -> Iterator[tuple[int, Diagnosis]]:
+    """Yield diagnoses of traces with their places, and add messages on those that fail."""
     alike = defaultdict[Hashable, list[int]](list)
     for index, (_, (recording, experiment)) in read.items():
         few = len(recording.time_s) * _MOST_IN_BATCH <= _MOST_READINGS
@@ -297,18 +296,18 @@ def _judge_batch(
         progress.done()
         progress.doing(step)
 
-    groups, judged = [*alike.values()], dict[int, Diagnosis]()
+    groups = [*alike.values()]
     for group in groups:
         traces, failed = [read[index][1] for index in group], dict[str, str]()
+        diagnoses: list[Diagnosis] = []
         with _caught(asked[group[0]], failed):
-            found = identify_alike(traces, progress=progress.within, doing=doing)
-            judged |= zip(group, found, strict=True)
+            diagnoses = identify_alike(traces, progress=progress.within, doing=doing)
+        yield from zip(group, diagnoses, strict=False)
         # An error is of one of a group: it is then identified one by one.
         if failed and len(group) > 1:
             groups += ([index] for index in group)
         else:
             refused |= failed
-    return judged
 
 
 @contextmanager

@@ -3,7 +3,7 @@
 import json
 import os
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from io import StringIO
 from pathlib import Path
@@ -42,6 +42,8 @@ _OF_QUANTITY = ("verdict", "value", "low", "high")
 _RADIANS = re.compile("_rad(?=$|_per_s$)")
 # A header that may be long has its mark at the end.
 _HEAD_BYTES = 100_000
+# The trace of which a file is the result.
+_OF_TRACE = re.compile(rb'^ "trace": ("(?:[^"\\\\]|\\\\.)*"),$', re.M)
 
 
 @dataclass(frozen=True)
@@ -58,19 +60,30 @@ class Outcome:
     """Cells to copy from a table of traces by file, of all in the order of its rows, and column."""
 
 
-def check_outputs(outputs: Sequence[Path], inputs: Iterable[Path]) -> None:
-    """Refuse, by a `BiogripError`, files that are also read, or written twice, or not ours."""
-    if len({path.absolute() for path in outputs}) < len(outputs):
-        raise BiogripError("found the same file to be written twice; allowed are different ones.")
+def check_outputs(outputs: Iterable[tuple[str, Path | None]], inputs: Iterable[Path]) -> None:
+    """Refuse, by a `BiogripError`, files that are read, or written twice, or not to be replaced.
+
+    `outputs` are those that are asked for, each behind its trace or its option.
+    """
     # Path.exists raises for invalid paths; os.path.exists returns False.
-    read = [path for path in inputs if os.path.exists(path)]
-    for output in outputs:
-        if os.path.exists(output) and any(output.samefile(path) for path in read):
+    read = {os.path.realpath(path) for path in inputs if os.path.exists(path)}
+    first: dict[str, str] = {}
+    for written_for, output in outputs:
+        if output is None:
+            continue
+        place = os.path.join(os.path.realpath(output.parent), output.name)
+        if place in first:
+            text = (
+                f"would be written for '{visible(first[place])}' and for '{visible(written_for)}'"
+            )
+            raise BiogripError(f"{visible(output)}: {text}; allowed is a file for each.")
+        first[place] = written_for
+        if os.path.realpath(output) in read:
             raise BiogripError(f"{visible(output)}: is read; allowed is another file to write.")
-        _check_output(output)
+        _check_output(output, written_for)
 
 
-def _check_output(output: Path) -> None:
+def _check_output(output: Path, written_for: str) -> None:
     folder = output.parent
     if os.path.isdir(output) or not os.path.isdir(folder) or not os.access(folder, os.W_OK):
         text = "cannot be written; allowed is a file in a folder that you may write to."
@@ -83,13 +96,30 @@ def _check_output(output: Path) -> None:
         raise BiogripError(f"{visible(output)}: cannot be written: {error.strerror}.") from error
     if output.exists() and not output.is_symlink() and not output.is_file():
         raise BiogripError(f"{visible(output)}: is no regular file; allowed is one.")
-    ours = not os.path.lexists(output)
-    if not ours and not output.is_symlink():
+    if not os.path.lexists(output):
+        return
+    head = b""
+    if not output.is_symlink():
         with output.open("rb") as stream:
-            ours = WRITTEN_BY.encode() in stream.read(_HEAD_BYTES)
-    if not ours:
-        text = "is there, and biogrip did not write it; allowed is another name, or to delete it "
-        raise BiogripError(f"{visible(output)}: {text}first.")
+            head = stream.read(_HEAD_BYTES)
+    of_trace = _OF_TRACE.search(head)
+    trace = json.loads(of_trace[1]) if of_trace else written_for
+    if WRITTEN_BY.encode() not in head:
+        problem = "is there, and biogrip did not write it"
+    elif not _are_of_one_trace(trace, written_for):
+        problem = f"is the result of '{visible(trace)}', and would be replaced for "
+        problem += f"'{visible(written_for)}'"
+    else:
+        return
+    text = f"{problem}; allowed is another name, or to delete it first."
+    raise BiogripError(f"{visible(output)}: {text}")
+
+
+def _are_of_one_trace(one: str, other: str) -> bool:
+    """Return True if two names are of one trace; the folder may be said from another one."""
+    if os.path.exists(one) and os.path.exists(other):
+        return os.path.samefile(one, other)
+    return os.path.basename(one) == os.path.basename(other)
 
 
 # Keys of a result that are in the unit of what is read.

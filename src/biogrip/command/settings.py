@@ -9,6 +9,7 @@ of the trace, from ``--hold``, or from a column of the file, ``--load``; where a
 modulus is read, a hold of 1 needs no option.
 """
 
+import os
 import re
 import sys
 from collections.abc import Mapping, Sequence
@@ -16,6 +17,7 @@ from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import numpy as np
 
@@ -67,6 +69,8 @@ LOAD = ("measurement", "load")
 """Key of the column of what was controlled."""
 
 _PROTOCOLS = (HOLD, LOAD, ("protocol",))
+# What stands in no name of a file everywhere, and what writes it.
+_UNSAFE = re.compile(r"[^\w .,=()+-]")
 _PRONY = re.compile(r"(?:prony|sls)_?([1-8])")
 # Of each group of keys of the measurement, the one that is set last replaces the others.
 _ONE_OF = {"start_s", "fit_start"}, {*READINGS}
@@ -99,9 +103,10 @@ class Asked:
 
     @property
     def output(self) -> Path:
-        """The usual JSON file."""
-        part = re.sub(r"[^\w.-]+", "_", f".{self.part}").rstrip(".")
-        return self.trace.with_name(f"{self.trace.stem}{part}.identified.json")
+        """The usual JSON file: no two names of traces give one, but those with .csv and without."""
+        part = _UNSAFE.sub(lambda mark: quote(os.fsencode(mark[0]), safe=""), self.part)
+        name = ".".join(filter(None, (self.trace.name.removesuffix(".csv"), part)))
+        return self.trace.with_name(f"{name}.identified.json")
 
     @property
     def configs(self) -> list[Path]:
@@ -301,7 +306,10 @@ def _measurement_of(
     """Return the block of the measurement, with its file and the usual names of columns."""
     axis = {"frequency": "omega_rad_per_s"} if instrument.sweeps else {"time": "time_s"}
     usual = {**axis, instrument.read.name: instrument.read.column}
-    file = ARRAYS if asked.arrays else str(asked.trace)
+    file = str(asked.trace)
+    # A block cannot have a name that is not valid text.
+    if asked.arrays or file.encode(errors="ignore").decode() != file:
+        file = ARRAYS
     measurement: dict[str, Any] = with_numbers(MeasurementBlock, {**usual, **given, "file": file})
     return measurement
 

@@ -35,6 +35,8 @@ _HELD = {"held", "load", "pressure", "indentation", *(channel.name for channel i
 _SEPARATORS = ",;\t"
 _OF_RESULTS = re.compile(r".* (verdict|value|low|high)( \(.*\))?")
 _HEAD_BYTES = 100_000
+# Of a table of traces at most; rows are as wide as its header.
+_LONGEST, _MOST_COLUMNS, _MOST_CELLS = 20_000_000, 1000, 3_000_000
 
 
 def is_table(asked: Asked) -> bool:
@@ -166,11 +168,17 @@ def _rows(path: Path) -> list[tuple[int, list[str]]]:
     if problem := trace_file_problem(path):
         raise BiogripError(f"{place(path)}: {problem}")
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        with path.open(encoding="utf-8-sig") as stream:
+            text = stream.read(_LONGEST + 1)
+        if len(text) > _LONGEST:
+            raise ValueError(f"found more than {_LONGEST} characters, allowed are fewer")
         header = text.partition("\n")[0]
         separator = "\t" if path.suffix == ".tsv" else max(_SEPARATORS, key=header.count)
         reader = csv.reader(StringIO(text), delimiter=separator, skipinitialspace=True, strict=True)
         if rows := [(reader.line_num, [*map(str.strip, row)]) for row in reader]:
+            if (columns := len(rows[0][1])) > _MOST_COLUMNS or columns * len(rows) > _MOST_CELLS:
+                text = f"found {columns} columns and {len(rows)} rows, allowed are {_MOST_COLUMNS}"
+                raise ValueError(f"{text} columns and {_MOST_CELLS} cells")
             return rows
         raise ValueError("it is empty")
     except (OSError, ValueError, csv.Error) as error:

@@ -106,11 +106,22 @@ def scalar_problem(node: yaml.ScalarNode) -> str | None:
     return f"found {text}, which YAML reads {reading}, or text in quotes."
 
 
+def _refuse_deep(text: str, loader: Any) -> None:
+    """Refuse blocks in blocks, by a `ValueError`, before those that read a tree end by them."""
+    depth = 0
+    for event in yaml.parse(text, loader):
+        depth += isinstance(event, yaml.CollectionStartEvent)
+        depth -= isinstance(event, yaml.CollectionEndEvent)
+        if depth > _DEEPEST:
+            raise ValueError(f"found more than {_DEEPEST} levels, allowed are fewer")
+
+
 def value_of(text: str, key: str = "") -> Any:
     """Read the value of a key as YAML, units as text; refuse what is not read as it looks."""
     if key.endswith("_unit"):
         return text
     try:
+        _refuse_deep(text, yaml.SafeLoader)
         node = yaml.compose(text, yaml.SafeLoader)
         problem = scalar_problem(node) if isinstance(node, yaml.ScalarNode) else None
         if any(isinstance(token, yaml.AliasToken) for token in yaml.scan(text)):
@@ -152,6 +163,7 @@ def _read(file: Path) -> tuple[Lines, dict[str, Any]]:
 # The defaults are read again for every trace.
 @lru_cache(maxsize=16)
 def _parsed(file: Path, text: str) -> tuple[Lines, dict[str, Any]]:
+    _refuse_deep(text, _Loader)
     root = yaml.compose(text, Loader=_Loader)
     lines: dict[KeyPath, int] = {}
     if root is None:

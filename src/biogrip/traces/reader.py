@@ -138,6 +138,10 @@ class Recording:
                 f"The {form['decimal']} of {form['unclear']} is read as a decimal mark; where it "
                 "is between thousands, numbers are 1000 times as large."
             )
+        if "below" in form:
+            said.append(f"Left out below the last row, where it may be cut: {form['below']}.")
+        if "lacks" in form:
+            said.append(f"The last row has {form['lacks']}, as where a file was cut.")
         if "clock" in form:
             begins = ", when the protocol is taken to start" * form["clock"].startswith("dates")
             said.append(f"Times are {form['clock']}{begins * (self.onset_s is None)}.")
@@ -215,6 +219,7 @@ def read_recording(path: Path, columns: MeasurementBlock) -> Recording:
         "rows": len(values),
         **recording.form,
         "others": int(np.count_nonzero(~chosen)) or None,
+        **(_signs_of_a_cut(sheet, tables[-1]) if max(places) + 1 == len(tables) else {}),
     }
     form = {key: value for key, value in form.items() if value is not None}
     return replace(recording, form=form, load=load, remarks_before=remarks)
@@ -534,6 +539,18 @@ def _numbers(
             falls = np.diff(values[there, 0], prepend=values[there[:1], 0]) < -DAY_S / 2
             values[there, 0] += DAY_S * np.cumsum(falls)
     return values, form
+
+
+def _signs_of_a_cut(sheet: Sheet, table: Table) -> dict[str, str | None]:
+    """Return what is below the last table of a file, and what its last row lacks."""
+    words = " ".join(sheet.cells[table.end :, 0])
+    lacks, last = None, table.end - 1
+    if sheet.numbers[last] == sheet.without_end:
+        lacks = "no line end"
+    if last > table.first and sheet.widths[last] < sheet.widths[last - 1]:
+        lacks = "fewer cells than the row before"
+    below = f"'{visible(shortened(words))}'" if words else None
+    return {"below": below, "lacks": lacks}
 
 
 def _chosen(path: Path, sheet: Sheet, table: Table, columns: MeasurementBlock) -> BoolArray:

@@ -75,6 +75,8 @@ _NAMES_SHOWN = 8
 _TABLES_SHOWN = 50
 # Where separator and header are looked for if no line has the columns.
 _LINES_SEARCHED = 200
+# With these, a file of any content takes less than 1 GB. Cells are lines times the widest.
+_LARGEST_BYTES, _LONGEST_LINE, _MOST_LINES, _MOST_CELLS = 50_000_000, 100_000, 1_200_000, 5_000_000
 
 
 @dataclass(frozen=True)
@@ -92,6 +94,8 @@ class Sheet:
     """Line numbers in the file, from 1, (n_lines,); 0 of names that are numbers of columns."""
     headers: list[int]
     """Places of lines that may be headers: of the first, and of those that begin with words."""
+    without_end: int = 0
+    """Line number of the file's last line, if it has no line end."""
 
 
 @dataclass(frozen=True)
@@ -126,9 +130,10 @@ def read_sheet(path: Path, columns: MeasurementBlock) -> Sheet:
     """Read the cells of a text file.
 
     A `BiogripError` says that it is no file, or no text in UTF-8, UTF-16 or Windows-1252, or which
-    quote has no end.
+    quote has no end, or that file or line is too large.
     """
     encoding, lines = _read_lines(path)
+    without_end = len(lines) if lines[-1].strip() else 0
     numbered = _with_names(lines, {*map(plain_name, columns.named.values())})
     if not numbered:
         raise BiogripError(f"{place(path)}: found no header, allowed is a line with column names.")
@@ -139,37 +144,69 @@ def read_sheet(path: Path, columns: MeasurementBlock) -> Sheet:
         named, width = "\t", len(_CELL.findall(lines[-1]))
         parted = [(_WIDE_GAP.split(line.strip()), _CELL.findall(line)) for line in lines]
         lines = ["\t".join(wide if len(wide) == width else cells) for wide, cells in parted]
-    rows: list[list[str]] = []
-    reader = csv.reader(lines, delimiter=named, skipinitialspace=True)
+    cells, widths = _cells(path, lines, kept, named)
+    return Sheet(encoding, separator, cells, widths, kept, headers, without_end)
+
+
+def _cells(
+    path: Path, lines: Sequence[str], numbers: IntArray, separator: str
+) -> tuple[NDArray[Any], IntArray]:
+    """Return the cells of lines, (n_lines, n_columns), and how many each line has, (n_lines,)."""
+    most = [line.count(separator) + 1 for line in lines]
+    if len(lines) * (widest := max(most)) > _MOST_CELLS:
+        raise BiogripError(
+            f"{place(path, numbers[most.index(widest)])}: found {counted(widest, 'cell')}, and "
+            f"{counted(len(lines), 'line')} in all; allowed are {_MOST_CELLS} cells, if all lines "
+            "were as wide."
+        )
+    cells, widths = np.full((len(lines), widest), "", object), np.zeros(len(lines), int)
+    reader = csv.reader(lines, delimiter=separator, skipinitialspace=True)
+    row = -1
     try:
-        for cells in reader:
-            if reader.line_num > len(rows) + 1:
+        for row, found in enumerate(reader):
+            if reader.line_num > row + 1:
                 raise BiogripError(
-                    f"{place(path, kept[len(rows)])}: found a quote without its end, allowed are "
+                    f"{place(path, numbers[row])}: found a quote without its end, allowed are "
                     "quoted cells that end on their line."
                 )
-            rows.append([*map(str.strip, cells)])
+            cells[row, : len(found)] = [*map(str.strip, found)]
+            widths[row] = len(found)
     except csv.Error as error:
-        raise BiogripError(f"{place(path, kept[len(rows)])}: found a {error}.") from error
-    widths = np.array([*map(len, rows)])
-    widest = int(widths.max())
-    padded = [cells + [""] * (widest - len(cells)) for cells in rows]
-    return Sheet(encoding, separator, np.array(padded, dtype=object), widths, kept, headers)
+        raise BiogripError(f"{place(path, numbers[row + 1])}: found a {error}.") from error
+    return cells, widths
 
 
 def _read_lines(path: Path) -> tuple[str, list[str]]:
+    encoding, text = _read_text(path)
+    if (ends := max(map(text.count, "\r\n"))) > _MOST_LINES:
+        said = f"found {ends} lines; allowed are at most {_MOST_LINES}."
+        raise BiogripError(f"{place(path)}: {said}")
+    lines = _LINE_END.split(text)
+    if (longest := max(map(len, lines))) > _LONGEST_LINE:
+        line = next(number for number, line in enumerate(lines, 1) if len(line) == longest)
+        text = f"found {longest} characters, allowed are at most {_LONGEST_LINE} in a line."
+        raise BiogripError(f"{place(path, line)}: {text}")
+    return encoding, lines
+
+
+def _read_text(path: Path) -> tuple[str, str]:
+    """Return the encoding and the text of a file."""
     if problem := trace_file_problem(path):
         raise BiogripError(f"{place(path)}: {problem}")
     try:
-        content = path.read_bytes()
+        with path.open("rb") as stream:
+            content = stream.read(_LARGEST_BYTES + 1)
     except OSError as error:
         raise BiogripError(f"{place(path)}: cannot be read: {error.strerror}.") from error
+    if len(content) > _LARGEST_BYTES:
+        text = f"found more than {_LARGEST_BYTES} bytes; allowed are fewer, as by fewer columns."
+        raise BiogripError(f"{place(path)}: {text}")
     encodings = {"utf-8-sig": "UTF-8", "cp1252": "Windows-1252"}
     if content.startswith((BOM_UTF16_LE, BOM_UTF16_BE)):
         encodings = {"utf-16": "UTF-16"}
     for codec, encoding in encodings.items():
         try:
-            return encoding, _LINE_END.split(content.decode(codec))
+            return encoding, content.decode(codec)
         except UnicodeDecodeError as error:
             start = error.start
     line = len(_LINE_END.split(content[:start].decode(codec)))
