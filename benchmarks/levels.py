@@ -415,7 +415,7 @@ def _set_ups() -> list[SetUp]:
         )
     ]
     zener = "--reading=stress=stress_Pa", "--load=strain", "--model=zener_maxwell"
-    sphere = "--reading=force=Force (N)", "--load=Depth (m)", "--sphere=2.5 um"
+    sphere = "--reading=force=Force (N)", "--load=Depth (m)", "--shape=sphere 2.5 um"
     rise = "--reading=stress=stress_Pa", "--hold=1", "--ramp=2s", "--model=zener_maxwell"
     found += [
         SetUp(ADDS, "zero, told by rows before", with_zero, (*_RESPONSES["creep"][2][1:], *told)),

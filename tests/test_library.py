@@ -101,7 +101,7 @@ def test_a_trace_is_identified_again_by_a_model_s_usual_name_and_drawn_by_its_cl
     found = told(FRAME["t"], FRAME["strain"], **HELD, start=85)
     other = found.refit(model="KV")
     assert (other.data["model"], other.status) == ("kelvin_voigt", "rejected")
-    assert (found.data["model"], found.status) == ("zener_kelvin", "doubtful")
+    assert (found.data["model"], found.status) == ("zener_kelvin", "ok")
     assert other.data["load"] == found.data["load"]
     above, below = found.plot().axes
     assert below.get_xlim() == pytest.approx((80.1, 144.9))

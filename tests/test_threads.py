@@ -16,7 +16,8 @@ from biogrip.cli import _parser
 from biogrip.command.options import GROUPS
 
 VALUES = {"--hold": "5", "--set": "measurement.block=2", "--fix": "k_p=0"}
-VALUES |= {"--start": "1.5", "--at": "1,10"}
+VALUES |= {"--start": "1.5", "--at": "1,10", "--ramp": "1s", "--contact": "fit"}
+VALUES |= {"--block": "1,2", "--rows": "T=20", "--noise-share": "2%", "--phase-sd": "1deg"}
 parser = _parser()
 for name, metavar, *_ in (option for options in GROUPS.values() for option in options):
     given = [name, VALUES.get(name, "a")] if metavar else [name]

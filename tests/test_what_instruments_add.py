@@ -106,7 +106,7 @@ def test_deviations_that_are_a_share_of_each_reading_are_of_the_smooth_course(
 
 
 RADIUS_M, OFF_M = 2.5e-6, 60e-9
-SPHERE = ("--reading", "force=force_N", "--load", "depth_m", "--sphere", "2.5 um")
+SPHERE = ("--reading", "force=force_N", "--load", "depth_m", "--shape", "sphere 2.5 um")
 
 
 def approach(off_m: float, name: Path) -> Path:
@@ -146,7 +146,7 @@ def test_a_right_contact_is_not_doubted(tmp_path: Path) -> None:
 
 def test_of_a_dwell_alone_nothing_tells_the_contact(tmp_path: Path) -> None:
     trace = write_trace(tmp_path / "dwell.csv", AFTER_S, AFTER_S, header="time_s,force_N")
-    given = (trace, "--reading", "force=force_N", "--hold", "500 nm", "--sphere", "2.5 um")
+    given = (trace, "--reading", "force=force_N", "--hold", "500 nm", "--shape", "sphere 2.5 um")
     status, _, complained = identify(*given, "--contact", "fit")
     assert status
     assert "takes the shape of a tip, and a recorded depth (--load)" in complained

@@ -24,8 +24,7 @@ from biogrip.config.source import HOLD, RAMP
 from biogrip.errors import BiogripError
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import identify_many
-from biogrip.fit.problem import Fit, silent
-from biogrip.fit.search_range import GeneRange
+from biogrip.fit.problem import Fit, GeneRange, silent
 from biogrip.identify.identify import identify
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.physics.gripper import NO_ARMS, Arm, Gripper

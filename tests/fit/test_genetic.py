@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array, IntArray
-from biogrip.fit.problem import Fit, History, TraceProblem
-from biogrip.fit.search_range import GeneRange
+from biogrip.fit.problem import Fit, GeneRange, History, TraceProblem
 from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.sample_model import with_fixed
 from biogrip_study.methods import genetic

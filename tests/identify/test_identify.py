@@ -56,9 +56,9 @@ def test_a_study_gives_the_answer_of_the_command(
     columns: dict[str, str],
     terms: dict[str, Any],
 ) -> None:
-    """To the last bit; of a sample far from the search ranges, which follow from the trace."""
+    """To the last bit, of one name, which random starts go by; far from the usual search ranges."""
     rows = (SECONDS, STRAIN) if "time" in columns else (HERTZ, MODULI.real, MODULI.imag)
-    file = write_trace(tmp_path / "trace.csv", *rows, header=",".join(columns.values()))
+    file = write_trace(tmp_path / "mine.csv", *rows, header=",".join(columns.values()))
     lab: dict[str, Any] = {"measurement": columns | terms}
     lab["instrument"] = "creep" if "time" in columns else "oscillation"
     lab["protocol"] = {"phases": [{"duration_s": 600.0, **held}]}

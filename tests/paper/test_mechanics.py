@@ -11,7 +11,7 @@ from scipy.stats import gaussian_kde
 
 from biogrip import library
 from biogrip.errors import BiogripError
-from biogrip.fit.search_range import GeneRange
+from biogrip.fit.problem import GeneRange
 from biogrip.physics.gripper import torque
 from biogrip.physics.models import MODELS, Sample
 from biogrip_study.config.published import Published

@@ -145,8 +145,8 @@ def test_phases_in_blocks_are_phases_one_by_one(
     for times in (rows_s, np.sort(RNG.uniform(-1.0, 10.0, 400))):
         found = [*modes.responses_in_turn(rates, course, times)]
         with monkeypatch.context() as one_by_one:
-            one_by_one.setattr(modes, "_FEW", 1000)
-            one_by_one.setattr(modes, "_NUMBERS_AT_ONCE", 500)
+            one_by_one.setattr(modes, "_MOST_ONE_BY_ONE", 1000)
+            one_by_one.setattr(modes, "_MODE_NUMBERS_AT_ONCE", 500)
             expected = [*modes.responses_in_turn(rates, course, times)]
         own, other = (np.concatenate([it for _, it in of], axis=3) for of in (found, expected))
         assert np.all(np.abs(own - other) <= 1e-12 * np.abs(other).max(axis=3, keepdims=True))

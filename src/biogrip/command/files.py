@@ -36,7 +36,7 @@ from biogrip.config.loading import trace_defaults
 from biogrip.errors import BiogripError
 from biogrip.files import digest_of, software
 from biogrip.fit.experiment import Experiment
-from biogrip.fit.search_range import SearchRange
+from biogrip.fit.problem import SearchRange
 from biogrip.identify.data import trace_data
 from biogrip.identify.identify import STEPS, budget, identify_alike
 from biogrip.identify.other_fits import Trace

@@ -15,7 +15,7 @@ from biogrip.config.messages import checked, with_numbers
 from biogrip.config.source import KeyPath, Source, dotted, overlaid, place, read_config, read_source
 from biogrip.config.trace_blocks import IntervalBlock
 from biogrip.errors import BiogripError
-from biogrip.fit.search_range import GeneRange, SearchRange
+from biogrip.fit.problem import GeneRange, SearchRange
 from biogrip.keys import Complaint, built
 
 T = TypeVar("T")

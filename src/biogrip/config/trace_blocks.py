@@ -20,7 +20,7 @@ from biogrip.config.experiment_blocks import (
 )
 from biogrip.errors import BiogripError
 from biogrip.fit.least_squares import LeastSquaresSettings
-from biogrip.fit.search_range import SearchRange
+from biogrip.fit.problem import SearchRange
 from biogrip.keys import Block, Complaint, Distinct, OneOf, below
 from biogrip.physics.gripper import CombDrive
 from biogrip.physics.instruments import GRIPPER, KINDS, Instrument, of_kind

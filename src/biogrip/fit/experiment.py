@@ -8,8 +8,7 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.fit.least_squares import LeastSquaresSettings
-from biogrip.fit.problem import TraceProblem, make_problem
-from biogrip.fit.search_range import GeneRange
+from biogrip.fit.problem import GeneRange, TraceProblem, make_problem
 from biogrip.physics.condensed import Condensed, SweptRows
 from biogrip.physics.fractional import LONGEST_S, on_clock
 from biogrip.physics.gripper import Gripper

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biogrip import levels
+import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray
 from biogrip.digits import plain
 from biogrip.fit.any_sample import count_lags, fit_responses, scatter_of, spread_swept_lags

@@ -7,7 +7,6 @@ import numpy as np
 
 from biogrip.digits import counted, plain, round_increase
 from biogrip.fit.experiment import Experiment
-from biogrip.identify.contact import depth_limits
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.judging.doubts import REJECTED, REJECTION, find_reasons, order_notes
 from biogrip.judging.verdicts import FIT_REJECTED, Finding
@@ -157,6 +156,8 @@ def _fitted_along(
     if diagnosis.onset_limits_s:
         found["onset_limits_s"] = [found["onset_s"] + end_s for end_s in diagnosis.onset_limits_s]
     if experiment.fit_contact:
+        from biogrip.identify.contact import depth_limits
+
         value, *limits = depth_limits(diagnosis)
         found |= {"contact_m": value, "contact_limits_m": limits}
     if not (experiment.offset or experiment.drift):

@@ -18,7 +18,6 @@ from biogrip.digits import counted
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.problem import ReportProgress, silent
 from biogrip.fit.trace_fit import TraceFit
-from biogrip.identify.contact import notes_on_contact
 from biogrip.identify.other_fits import (
     Trace,
     fits_of,
@@ -123,7 +122,12 @@ def _notes_on_trace(
     if experiment.instrument.sweeps:
         return
     yield from notes_on_gains(judged.likelihood, judged.notes)
-    start = [*notes_on_contact(replace(judged, recording=recording, experiment=experiment))]
+    start: list[Note] = []
+    if experiment.tip_power is not None:
+        # Imported here: most traces are of no tip.
+        from biogrip.identify.contact import notes_on_contact
+
+        start += notes_on_contact(replace(judged, recording=recording, experiment=experiment))
     start = start or notes_on_start(experiment, recording.time_s, recording.readings, judged)
     yield from start
     rounded = any(note.about == ROUNDED and note.weight == DOUBT for note in judged.notes)

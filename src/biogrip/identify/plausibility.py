@@ -184,7 +184,7 @@ def _check_contact(recording: Recording) -> None:
         return
     at = int(np.argmax(np.abs(recording.readings)))
     there_s = float(recording.time_s[at]) + (recording.onset_s or 0.0)
-    if np.interp(there_s, *load.T) == 0 < np.max(load[:, 1]):
+    if np.interp(there_s, *load.T) <= 0 < np.max(load[:, 1]):
         raise BiogripError(
             f"{recording.place(at, columns.reading_column)}: found the largest reading where the "
             f"column '{columns.load}' is not above zero, as of a separation that is negative in "

@@ -22,10 +22,7 @@ from biogrip.digits import plain
 from biogrip.errors import BiogripError
 from biogrip.fit.any_sample import proportional_deviations
 from biogrip.fit.experiment import Experiment
-from biogrip.fit.search_range import GeneRange
-from biogrip.fit.swept_noise import estimate_swept_noise
-from biogrip.identify.contact import with_contact
-from biogrip.identify.load_noise import with_its_steps, without_noise
+from biogrip.fit.problem import GeneRange
 from biogrip.identify.plausibility import check_moduli, check_recording
 from biogrip.judging.onset import OnsetFits, begins_constant, estimate_onset
 from biogrip.physics.fractional import LONGEST_S, SHORTEST_S
@@ -57,7 +54,10 @@ def prepare(recording: Recording, experiment: Experiment) -> tuple[Recording, Ex
 
     A `BiogripError` has file, line and column of what is impossible with instrument and protocol.
     """
+    # Imported here, as below: of most traces no load was recorded.
     if experiment.record is not None:
+        from biogrip.identify.load_noise import with_its_steps, without_noise
+
         experiment, recording = with_its_steps(experiment, recording)
     experiment, recording = _with_share(experiment, recording)
     recording = _checked(recording, experiment)
@@ -65,6 +65,8 @@ def prepare(recording: Recording, experiment: Experiment) -> tuple[Recording, Ex
         experiment, recording = without_noise(experiment, recording)
     experiment, recording = _with_zero(experiment, recording)
     if experiment.fit_contact:
+        from biogrip.identify.contact import with_contact
+
         experiment = with_contact(for_trace(experiment, recording), recording)
     experiment = for_trace(experiment, recording)
     if experiment.fit_start and recording.onset_s is not None:
@@ -182,6 +184,8 @@ def _with_deviations(sweep: Recording, experiment: Experiment) -> Recording:
     if (known := noise_sd if sweep.sd is None and share is None else sweep.sd) is not None:
         check_moduli(sweep, known)
         return sweep
+    from biogrip.fit.swept_noise import estimate_swept_noise
+
     sizes = [size for size in (share, sweep.read.phase_sd_rad) if size is not None]
     noise = estimate_swept_noise(sweep.time_s, sweep.readings, sizes or None, noise_sd or 0.0)
     check_moduli(sweep, noise.sd)

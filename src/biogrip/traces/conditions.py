@@ -11,7 +11,7 @@ from itertools import combinations
 
 import numpy as np
 
-from biogrip import levels
+import biogrip.levels as levels
 from biogrip.arrays import Array
 from biogrip.digits import plain
 from biogrip.traces.tables import number_or_inf

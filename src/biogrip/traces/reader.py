@@ -16,7 +16,6 @@ from biogrip.physics.instruments import INSTRUMENTS, PHASE, ROTATION, VISCOSITY
 from biogrip.physics.protocol import joined
 from biogrip.terminal import visible
 from biogrip.traces.columns import AXES, listed, place, shortened, unit_of
-from biogrip.traces.conditions import are_repeats, is_like, tells_apart
 from biogrip.traces.measurement_block import UNREAD, MeasurementBlock
 from biogrip.traces.tables import (
     BLANKS,
@@ -556,7 +555,12 @@ def _signs_of_a_cut(sheet: Sheet, table: Table) -> dict[str, str | None]:
 def _chosen(path: Path, sheet: Sheet, table: Table, columns: MeasurementBlock) -> BoolArray:
     """Return which rows have the values of other columns that are asked for, (n_rows,)."""
     chosen = np.ones(table.end - table.first, bool)
-    for column, wanted in (columns.rows or {}).items():
+    if not columns.rows:
+        return chosen
+    # Imported here, as below: most traces are of one condition.
+    from biogrip.traces.conditions import is_like
+
+    for column, wanted in columns.rows.items():
         line = int(sheet.numbers[table.at]) or None
         where = place(path, line, column)
         if not (same := table.indices(column)):
@@ -586,6 +590,8 @@ def _check_conditions(
     falls = columns.axis == "time" and bool(np.any(np.diff(places) < 0))
     if not falls and len(np.unique(places)) == len(places):
         return
+    from biogrip.traces.conditions import are_repeats, tells_apart
+
     sweeps = columns.axis == "frequency"
     scale = np.log(places) if sweeps and np.all(places > 0) else places
     if not falls and are_repeats(scale, values[numbers, 1:]):

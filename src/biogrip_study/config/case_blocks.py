@@ -16,7 +16,7 @@ from biogrip.config.messages import checked
 from biogrip.config.source import overlaid
 from biogrip.config.trace_blocks import ExperimentBlocks, IntervalBlock, SampleBlocks
 from biogrip.digits import counted
-from biogrip.fit.search_range import GeneRange
+from biogrip.fit.problem import GeneRange
 from biogrip.keys import BY_KIND, Block, Complaint, Printed, below, plain
 from biogrip.physics.fractional import LONGEST_S, SHORTEST_S
 from biogrip.physics.gripper import Gripper

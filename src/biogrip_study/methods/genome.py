@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biogrip.arrays import Array, IntArray
-from biogrip.fit.search_range import GeneRange
+from biogrip.fit.problem import GeneRange
 
 Chromosomes = NDArray[np.integer[Any]]
 """Genes of individuals, (..., n_genes)."""
