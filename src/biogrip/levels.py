@@ -36,6 +36,10 @@ TOO_LITTLE = 0.5
 CLEARLY = 3.0
 """Growth of noise from which on its share is known, and unweighted fits are not compared."""
 
+FEWEST_STEPS = 6
+"""Extent of a record in steps of its rounding from which it may be a smooth course in coarse steps;
+a load that is on or off, or a staircase of a few levels, has steps that happened."""
+
 REPEATED, ALIKE, ONE_STEP = 0.45, 12.0, 1.5
 """Share of readings that repeat the one before if a sensor is logged more often than it is read:
 half or more if it is logged twice as often; how many times the usual run the longest may be, as if

@@ -75,7 +75,8 @@ def with_its_steps(experiment: Experiment, recording: Recording) -> tuple[Experi
     """
     assert experiment.record is not None
     record, uncertain_s = with_steps(experiment.record)
-    if step := measure_rounding(experiment.record[:, 1]):
+    step, extent = measure_rounding(experiment.record[:, 1]), np.ptp(experiment.record[:, 1])
+    if step and extent > levels.FEWEST_STEPS * step:
         other, other_s = with_steps(experiment.record, levels.ONE_STEP * step)
         smooth = np.column_stack((other[:, 0], smoothed(other[:, 1])[0]))
         given = recording.time_s - (recording.read.start_s or 0.0), recording.readings
