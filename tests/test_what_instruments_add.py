@@ -152,3 +152,19 @@ def test_of_a_dwell_alone_nothing_tells_the_contact(tmp_path: Path) -> None:
     assert "takes the shape of a tip, and a recorded depth (--load)" in complained
     with pytest.raises(SystemExit):
         identify(*given, "--contact", "5 nm")
+
+
+def test_a_load_that_is_on_or_off_has_its_steps(tmp_path: Path) -> None:
+    """Two pulls of 40 pN, as a bead's; all changes are of one size, which is no rounding."""
+    time_s = np.arange(0.0, 40.0, 0.1)
+    load = 40.0 * ((time_s >= 4.95) & (time_s < 9.95) | (time_s >= 19.95) & (time_s < 24.95))
+    depth = np.zeros(len(time_s))
+    for at_s, force in ((4.95, 40.0), (9.95, -40.0), (19.95, 40.0), (24.95, -40.0)):
+        since = np.maximum(time_s - at_s, 0.0)
+        depth += force / 20.0 * (1 - np.exp(-since / 2.0))
+    read_um = depth + noise(len(time_s), 0.01)
+    trace = write_trace(tmp_path / "pulls.csv", time_s, read_um, load, header="t_s,x_um,F_pN")
+    given = ("--time", "t_s", "--reading", "displacement=x_um", "--load", "F_pN")
+    found = identified(tmp_path, trace, *given, "--model", "kelvin_voigt", "--no-compare")
+    assert found["fit"] == "ok"
+    holds(found, k_p=2e-5, c_p=4e-5)
