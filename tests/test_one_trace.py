@@ -168,7 +168,7 @@ OPTIONS = {
     "--time=": "--time: measurement.time: found '' of 0 characters, allowed are at least 1.",
     f"--config {'x' * 300}": "File name too long",
     "--report theirs.html": "biogrip did not write it",
-    "--report x.html --csv x.html": "to be written twice",
+    "--report x.html --csv x.html": "would be written for '--report' and for '--csv'",
     "--csv b.csv": "b.csv: is there, and biogrip did not write it; allowed is another name",
     "--output a.csv": "a.csv: is read; allowed is another file to write.",
     "--output link.csv": "link.csv: is read; allowed is another file to write.",

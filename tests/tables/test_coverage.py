@@ -67,7 +67,9 @@ def test_verdicts_are_counted_beside_intervals(tmp_path: Path, target: Path) -> 
     lines = file.read_text().splitlines(keepends=True)
     for kept in range(1, len(lines)):
         file.write_text("".join(lines[:kept]))
-        with pytest.raises(BiogripError, match=r"seeds_0-2.csv: found \d+ rows, wanted .* delete"):
+        with pytest.raises(
+            BiogripError, match=r"seeds_0-2.csv: found \d+ rows, wanted .* --forcerun"
+        ):
             coverage(every_other, [target], [file], [])
 
 
