@@ -157,7 +157,8 @@ def test_of_a_dwell_alone_nothing_tells_the_contact(tmp_path: Path) -> None:
 def test_a_load_that_is_on_or_off_has_its_steps(tmp_path: Path) -> None:
     """Two pulls of 40 pN, as a bead's; all changes are of one size, which is no rounding."""
     time_s = np.arange(0.0, 40.0, 0.1)
-    load = 40.0 * ((time_s >= 4.95) & (time_s < 9.95) | (time_s >= 19.95) & (time_s < 24.95))
+    pulled = (time_s >= 4.95) & (time_s < 9.95) | (time_s >= 19.95) & (time_s < 24.95)
+    load = np.where(pulled, 40.0, 0.0)
     depth = np.zeros(len(time_s))
     for at_s, force in ((4.95, 40.0), (9.95, -40.0), (19.95, 40.0), (24.95, -40.0)):
         since = np.maximum(time_s - at_s, 0.0)
