@@ -302,13 +302,16 @@ def test_levels_and_powers_are_as_documented(name: str) -> None:
     assert f"| {name} | {in_words(DOCUMENTED[name])} |" in said
 
 
+NIGHTLY = pytest.mark.nightly
+
+
 @pytest.mark.parametrize(
     ("design", "least", "most"),
     [
         (Design(units=(3, 6), scatter=(0.1, 0.1)), 2, 8),
         (Design(units=(3, 3), days=0.35, scatter=(0.1, 0.1)), 2, 8),
-        (Design(units=(4, 4), bounded=(0, 0.28), bound="own"), 0, 7),
-        (Design(units=(4, 4), bounded=(0, 0.28), bound="noise"), 0, 8),
+        pytest.param(Design(units=(4, 4), bounded=(0, 0.28), bound="own"), 0, 7, marks=NIGHTLY),
+        pytest.param(Design(units=(4, 4), bounded=(0, 0.28), bound="noise"), 0, 8, marks=NIGHTLY),
         (Design(units=(3, 3), days=0.35, scatter=(0.05, 0.05), ratio=1.4), 40, 100),
     ],
     ids=str,

@@ -124,6 +124,9 @@ def test_the_method_needs_neither_the_study_nor_snakemake(tmp_path: Path) -> Non
     """Of every command, in a process in which importing either is an error."""
     shutil.copytree(ROOT / "data", tmp_path / "data")
     (tmp_path / "mine.yaml").write_text(PLANNED)
+    cells = tmp_path / "data" / "dishes" / "cells.tsv"
+    header, *rows = cells.read_text().splitlines(keepends=True)
+    cells.write_text("".join([header, rows[0], rows[-1]]))
     without = "sys.modules |= {'biogrip_study.config.study': None, 'snakemake': None}"
     code = f"import sys; {without}; from biogrip.cli import main; sys.exit(main(sys.argv[1:]))"
     for command in TYPED:
