@@ -199,7 +199,9 @@ def _graduated(values: Array, step: float) -> tuple[Array, Array]:
         noise = step / ROOT_12 * np.sqrt(equal)
     else:
         weight = min(_WEIGHTS, key=deviance)
-        noise = np.sqrt(values @ (values - smooth_with(weight, values)) / len(roughness))
+        # Of a record without noise rounding may leave less than nothing.
+        unexplained = max(float(values @ (values - smooth_with(weight, values))), 0.0)
+        noise = np.sqrt(unexplained / len(roughness))
     smooth_ones = int(np.count_nonzero(weight * roughness < _LEFT))
     smooth_ones = min(smooth_ones, _MOST_NUMBERS // count)
     waves = np.cos(np.pi * np.outer(places + 0.5, np.arange(1, smooth_ones)) / count)
