@@ -335,6 +335,13 @@ FEW = "p takes 3 units"
         ("12", "3456789", FEW),
         ("123", "456", "Welch of 3 and 3"),
         ("123", "456789", "Welch of 3 and 6"),
+        ("123", "456789X", FEW),
+        ("1234", "56789XYZUV", "Welch of 4 and 10"),
+        ("1", "12", FEW),
+        ("123", "345", FEW),
+        ("123", "234", "2 pairs"),
+        ("1234567", "7654321", "7 pairs"),
+        ("12", "123456789", "2 pairs"),
         ("1", "1", FEW),
         ("12", "12", "2 pairs"),
         ("123", "123", "3 pairs"),
@@ -392,7 +399,7 @@ def test_of_two_units_in_a_group_there_is_no_p() -> None:
     cells = Design(units=(2, 10)).table(np.random.default_rng(1))
     row = compare(cells, ["a", "b"], 0.95, units=True)["k", "b"]
     assert "p" not in row
-    assert "3 units in each group, or 2 that are in both" in row["no_p"]
+    assert "3 units in each group, 4 beside more than 6, or 2 that are in both" in row["no_p"]
     assert "ratio" in row
     assert "ratio_low" not in row
     first = compare(cells, ["a", "b"], 0.95, units=True)["k", "a"]
