@@ -12,8 +12,8 @@ DerSimonian and Laird (Controlled Clinical Trials 7 (1986), 177-188), of cells w
    test. Other units are compared by Welch's t test. Where there is both, the larger number of
    units decides, and the others are left out (Guo and Yuan, Statistical Methods in Medical Research
    26 (2017), 1323-1340, compare this with models of both).
-4. p takes `FEWEST_PAIRS`, or `FEWEST_UNITS` in each group, and one more beside over twice as many: of
-   two and ten units Welch's p is below 0.01 in up to 7 % of equal groups, of three and ten in 3 %.
+4. p takes `FEWEST_PAIRS`, or `FEWEST_UNITS` in each group, and one more beside over twice as many:
+   of equal groups of two and ten units 7 % have Welch's p below 0.01, of three and ten 3 %.
 5. Several groups are compared with the first after Holm (Scandinavian Journal of Statistics 6
    (1979), 65-70).
 
