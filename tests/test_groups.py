@@ -540,7 +540,8 @@ def test_of_one_unit_a_group_nothing_is_told_but_means(said: Said) -> None:
     ratio = median / np.exp(means_of(rows)["left"].mean())
     assert lines[4].split()[-3:] == [f"{median:.3g}", f"{ratio:.3g}", "none"]
     assert lines[5] == (
-        "No p for k of right: p takes 3 units in each group, or 2 that are in both."
+        "No p for k of right: p takes 3 units in each group, 4 beside more than 6, or 2 that are "
+        "in both."
     )
     paper = said(rows, "--unit", "day", part=1)
     assert "Ratios" not in paper

@@ -193,7 +193,8 @@ def settled(
 
 def _lower_fit(judged: Diagnosis, fit: Fit) -> Fit | None:
     """Return the fit from the lowest point of the profiles, if it is below the best fit."""
-    if judged.lowest is None:
+    exact = levels.EXACT * judged.likelihood.problem.residuals.peak
+    if judged.lowest is None or fit.misfit < exact:
         return None
     missed = fit.at(fit_from([judged.likelihood.problem], judged.lowest))
     return None if judged.likelihood.increase(missed.misfit) > -levels.MISSED else missed
