@@ -18,7 +18,7 @@ from biogrip.physics.protocol import evaluate, sample_times
 from biogrip.terminal import warn
 from biogrip.traces.columns import place
 from biogrip_study.config.study import Case
-from biogrip_study.gripper.calibration import FreeMotion, calibrate, calibration_yaml, free_motion
+from biogrip_study.gripper.calibration import calibrate, calibration_yaml, free_motion
 from biogrip_study.gripper.simulation import jaw_force, target_grip, target_rotation
 from biogrip_study.gripper.unilateral import unilateral_response
 from biogrip_study.records.rows import write_arrays
@@ -91,17 +91,15 @@ def calibrate_gripper(case: Case, gripper: Path, records: Path) -> None:
     time_s = sample_times(test.duration_s, test.rate_Hz)
     noise = Noise("gaussian", test.noise_level, "peak")
     causes = test.step_torque_Nm, test.impulse_Nms
-    columns, arms = {"time_s": time_s}, {}
+    columns, arms, uncertainty = {"time_s": time_s}, {}, {}
     for name in ("left", "right"):
-        motion = free_motion(getattr(case.gripper, name), time_s, *causes)
         rng = stream(case.study.config.study_seed, case.name, 0, f"calibration {name}")
-        record = FreeMotion(
-            time_s, add_noise(motion.step, noise, rng), add_noise(motion.impulse, noise, rng)
-        )
-        columns |= {f"{name}_step_rad": record.step, f"{name}_impulse_rad": record.impulse}
-        arms[name] = calibrate(record, *causes)
+        motion = free_motion(getattr(case.gripper, name), time_s, *causes)
+        measured = np.stack([add_noise(clean, noise, rng) for clean in motion])
+        columns |= zip((f"{name}_step_rad", f"{name}_impulse_rad"), measured, strict=True)
+        arms[name], uncertainty[name] = calibrate(time_s, measured, *causes)
     write_arrays(records, columns)
-    write_text(gripper, calibration_yaml(arms["left"], arms["right"]))
+    write_text(gripper, calibration_yaml(arms, uncertainty))
 
 
 def record(case: Case, recorded: Path, measurements: Path) -> None:
