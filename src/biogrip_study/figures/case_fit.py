@@ -55,7 +55,9 @@ def fits_of_basins(
 def _fit_of_seed(
     problem: Experiment, parameters: Mapping[str, float], made: Measurements, seed: int
 ) -> FittedTrace:
-    return fit_of(problem, parameters, made.time_s, made.readings[seed], made.sd, made.target)
+    return fit_of(
+        problem, parameters, made.time_s, made.readings[seed], made.known.get("sd"), made.target
+    )
 
 
 def first_seeds(identified: pd.DataFrame) -> pd.DataFrame:

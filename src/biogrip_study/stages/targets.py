@@ -6,6 +6,7 @@ the user's file. A calibration identifies the gripper's arms by a test without s
 """
 
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +23,13 @@ from biogrip_study.gripper.calibration import calibrate, calibration_yaml, free_
 from biogrip_study.gripper.simulation import jaw_force, target_grip, target_rotation
 from biogrip_study.gripper.unilateral import unilateral_response
 from biogrip_study.records.rows import write_arrays
-from biogrip_study.records.traces import Measurements, read_target, write_measurements, write_target
+from biogrip_study.records.traces import (
+    Measurements,
+    measurements_of,
+    read_target,
+    write_measurements,
+    write_target,
+)
 
 
 def simulate_target(case: Case, target: Path) -> None:
@@ -115,6 +122,4 @@ def record(case: Case, recorded: Path, measurements: Path) -> None:
     remarks = tuple(trace.remarks())
     for remark in remarks:
         warn(f"{place(recorded)}: {remark}")
-    known = trace.sd, trace.correlation, trace.sd_known, trace.onset_s, remarks
-    measured_trace = Measurements(trace.time_s, None, {0: trace.readings}, *known)
-    write_measurements(measurements, measured_trace)
+    write_measurements(measurements, measurements_of(replace(trace, remarks_before=remarks)))
