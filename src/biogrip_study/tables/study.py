@@ -24,6 +24,7 @@ from biogrip_study.records.identifications import (
     reached_encodable,
     read_identifications,
     share_with_limits,
+    values_by_quantity,
 )
 from biogrip_study.records.rows import require_rows, seeds_of
 from biogrip_study.records.traces import read_target
@@ -55,17 +56,15 @@ def methods(study: Study, identifications: list[Path]) -> ShownTable:
                 "case": name,
                 "method": METHODS[method].title,
                 "seeds": len(mine),
-                "median_rise": np.median(mine["increase"]),
-                "encodable_rise": np.median(mine["least"]),
-                "median_evaluations": float(mine["evaluations"].median()),
+                "median_rise": mine["increase"].median(),
+                "encodable_rise": mine["least"].median(),
+                "median_evaluations": mine["evaluations"].median(),
             }
             shares = share_with_limits(int(mine["reached"].sum()), len(mine))
             row |= zip(("reached_share", "reached_low", "reached_high"), shares, strict=True)
-            for quantity in case.sample.model.quantities:
-                label = " + ".join(p.name for p in quantity)
-                values = mine[[p.column for p in quantity]].sum(axis=1).to_numpy(float)
-                error = np.abs(error_percent(quantity_value(label, case.parameters), values))
-                row[f"error_percent {label}"] = np.median(error)
+            for label, values in values_by_quantity(mine, case.sample.model).items():
+                error = error_percent(quantity_value(label, case.parameters), values)
+                row[f"error_percent {label}"] = abs(error).median()
                 labels[f"error_percent {label}"] = f"Error {label} %"
             rows.append(row)
     errors = (Column(name, heading, 2) for name, heading in labels.items())
