@@ -118,7 +118,7 @@ def draw_force(case: Case, target: Path) -> Figure:
     forces.plot(time_s, factor * sticking, color=style.BLUE, label="jaws that hold the sample")
     forces.set(ylabel=f"jaw force ({unit})", title=case.title)
     turn_factor, turn_unit = scale_of(rotation, "rad")
-    name = "target" + (", jaws that let go" if case.unilateral else "")
+    name = "target" + (", jaws that let go" if case.block.contact == "unilateral" else "")
     rotations.plot(time_s, turn_factor * rotation, color=style.BLACK, label=name)
     rotations.set(ylabel=f"rotation ({turn_unit})", xlabel="time (s)")
     rotations.set_xlim(time_s[0], time_s[-1])
@@ -131,7 +131,7 @@ def draw_force(case: Case, target: Path) -> Figure:
             lost = time_s >= apart.changes_s[0]
             look = {"linestyle": "--", "color": style.ORANGE, "label": "jaws that let go"}
             forces.plot(time_s[lost], factor * apart.jaw_force_N[lost], **look)
-            if not case.unilateral:
+            if case.block.contact != "unilateral":
                 rotations.plot(time_s[lost], turn_factor * apart.rotation[0][lost], **look)
     forces.legend()
     rotations.legend()

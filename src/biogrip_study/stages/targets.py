@@ -39,7 +39,9 @@ def simulate_target(case: Case, target: Path) -> None:
     """
     time_s = case.times_s
     read, force = response(case, time_s)
-    _check_finite(case, time_s, read)
+    if not np.all(np.isfinite(read)):
+        text = f"the simulated {case.instrument.read.name} is not finite; allowed are parameters, "
+        raise BiogripError(f"{text}a gripper and a protocol for which it is.")
     if case.instrument.has_jaws:
         largest = float(np.max(np.abs(read)))
         if largest > case.stroke:
@@ -54,7 +56,7 @@ def simulate_target(case: Case, target: Path) -> None:
 def response(case: Case, time_s: Array) -> tuple[Array, Array | None]:
     """Return what is read and, if there are jaws, their force, (n_samples,) each."""
     device, nonlinear = (case.gripper, case.network, case.torque), case.nonlinear_target
-    if case.unilateral:
+    if case.block.contact == "unilateral":
         apart = unilateral_response(*device, time_s)
         return apart.rotation[0], apart.jaw_force_N
     read = target_rotation(*device, time_s, nonlinear=nonlinear)[0]
@@ -63,23 +65,12 @@ def response(case: Case, time_s: Array) -> tuple[Array, Array | None]:
     return read, jaw_force(*device, time_s, nonlinear=nonlinear)[0]
 
 
-def _check_finite(case: Case, time_s: Array, simulated: Array) -> None:
-    model, read = case.sample.model, case.instrument.read.name
-    for sample in np.flatnonzero(~np.isfinite(simulated))[:1]:
-        values = ", ".join(f"{name} = {case.parameters[name]:g}" for name in model.names)
-        raise BiogripError(
-            f"the simulated {read} of {model.title} with {values} is {simulated[sample]} "
-            f"at {time_s[sample]:g} s; allowed are parameters, a gripper and a protocol for which "
-            "it is finite."
-        )
-
-
 def _warn_if_contact_is_lost(case: Case) -> None:
     device = case.gripper, case.network, case.torque
     grip = target_grip(*device, nonlinear=case.nonlinear_target)
     if words := grip.words():
         then = "without adhesion contact is lost there (contact: unilateral simulates that)"
-        if case.unilateral:
+        if case.block.contact == "unilateral":
             then = "contact is lost there, which its identification ignores"
         warn(f"{case.name}: under this protocol {words}; {then}.")
 
