@@ -219,9 +219,7 @@ def test_the_bound_of_a_case_is_of_its_own_calibration(tmp_path: Path) -> None:
     rows = coverage(study, of_targets, batches, files).rows
     for name, file, of_target in zip(study.cases, files, of_targets, strict=True):
         (shown,) = (row for row in rows if (row["case"], row["quantity"]) == (name, "c + c_p"))
-        alone = {
-            q.label: bound for q, bound in bounds_at_truth(study.cases[name], of_target, [file])
-        }
+        alone = bounds_at_truth(study.cases[name], of_target, [file])
         assert shown["bound_percent"] == pytest.approx(100 * alone["c + c_p"])
     ends = [row["bound_percent"] for row in rows if row["quantity"] == "c + c_p"]
     assert ends[1] > 10 * ends[0]

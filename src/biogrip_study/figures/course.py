@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from biogrip.arrays import Array
 from biogrip.digits import with_unit
 from biogrip.figures import style
-from biogrip.judging.quantities import quantity_value
+from biogrip.judging.quantities import parameters_and_sum, quantity_value
 from biogrip.judging.verdicts import DETERMINED
 from biogrip_study.config.study import Case
 from biogrip_study.figures.case_fit import SHOWN_SEEDS, first_of_basins, seeds_in_words
@@ -172,7 +172,9 @@ def draw_scatter(
     printed = case.published.identified
     bounds = bounds_at_truth(case, target, calibrated)
     drawn, grid = style.row_of_panels(len(bounds), 3.1)
-    for index, (axes, (quantity, limit)) in enumerate(zip(grid, bounds, strict=True)):
+    quantities = parameters_and_sum(case.experiment.searched)
+    for index, (axes, quantity) in enumerate(zip(grid, quantities, strict=True)):
+        limit = bounds[quantity.label]
         true = quantity_value(quantity.label, case.parameters)
         if not true:
             axes.axis("off")
