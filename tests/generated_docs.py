@@ -22,12 +22,12 @@ from scipy.stats import chi2
 from biogrip.cli import main
 from biogrip.digits import plain as in_digits
 from biogrip.digits import with_unit
+from biogrip.fit.least_squares import identify_many
 from biogrip.fit.problem import silent
 from biogrip.physics.models import ALIASES, MAXWELL_MODELS
 from biogrip.physics.noise import add_noise, stream
 from biogrip.physics.simulation import simulated_response
 from biogrip.records import read_table
-from biogrip_study.methods.registry import identifier
 from biogrip_study.page import answers
 from biogrip_study.records.identifications import share_in_words
 from tests.helpers.default import STUDY, study_of
@@ -277,9 +277,9 @@ def slow_branch() -> str:
     (target,) = simulated_response(case.gripper, case.network, case.torque, time_s)
     rngs = [stream(STUDY.config.study_seed, case.name, seed, "noise") for seed in seeds]
     traces = [add_noise(target, case.noise, rng, time_s) for rng in rngs]
-    identify = identifier("least_squares", case.block.least_squares)
     posed = (each.experiment.to_identify().of_each(time_s, traces) for each in (case, slow))
-    free, held = (np.array([it.misfit for it in identify(each, rngs, silent)]) for each in posed)
+    fits_of = [identify_many(each, case.block.least_squares, rngs, silent) for each in posed]
+    free, held = (np.array([fit.misfit for fit in fits]) for fits in fits_of)
     limit = chi2.ppf(case.confidence, 1)
     fits = int(np.sum(len(time_s) * ((held / free) ** 2 - 1) < limit))
     return (

@@ -18,10 +18,11 @@ from tests.helpers.default import STUDY, seen, study_of
 from tests.helpers.places import EXAMPLE
 
 
-def drop(torque_Nm: float, *more: Phase, unilateral: bool = False) -> Any:
+def drop(torque_Nm: float, *more: Phase, contact: str | None = None) -> Any:
     torque, sample = join_phases((hold(100.0, torque_Nm), *more)), Sample("maxwell")
     device = {"instrument": GRIPPER, "gripper": STUDY.gripper, "stroke": 0.0785}
-    held = {"torque": torque, "times_s": sample_times(torque.end_s, 1.0), "unilateral": unilateral}
+    held = {"torque": torque, "times_s": sample_times(torque.end_s, 1.0)}
+    held |= {"block": seen(contact=contact)}
     known = {"name": "Drop", "sample": sample, "nonlinear_target": False, **device, **held}
     return seen(network=sample.model.network([1.0, 1.0]), **known)
 
@@ -48,7 +49,7 @@ def test_a_protocol_that_makes_the_jaws_pull_is_warned_of(
     force = pd.read_csv(file)["jaw_force_N"].to_numpy()
     assert np.all(force[time_s < 100] >= 0)
     assert force[time_s > 100].max() < 0
-    target.simulate_target(drop(1e-9, hold(100.0, 1e-10), unilateral=True), file)
+    target.simulate_target(drop(1e-9, hold(100.0, 1e-10), contact="unilateral"), file)
     assert "contact is lost there, which its identification ignores" in capsys.readouterr().out
     force = pd.read_csv(file)["jaw_force_N"].to_numpy()
     assert np.all(force[time_s > 100] == 0)

@@ -9,7 +9,7 @@ from scipy.stats import binomtest
 from biogrip.errors import BiogripError
 from biogrip.physics.response import step_response, superpose
 from biogrip.records import read_rows, write_object
-from biogrip_study.gripper.calibration import CalibratedArm, calibration_yaml
+from biogrip_study.gripper.calibration import calibration_yaml
 from biogrip_study.records.identifications import INTERVALS
 from biogrip_study.stages import judgement as stage
 from biogrip_study.stages import targets
@@ -121,8 +121,8 @@ def test_the_bound_of_a_case_is_that_of_its_calibration(tmp_path: Path) -> None:
     bounds = {}
     for name, case in study.cases.items():
         arm = replace(study.gripper.left, stiffness_Nm_per_rad=stiffness[name])
-        calibrated = CalibratedArm(arm, arm)
-        (tmp_path / f"{name}.yaml").write_text(calibration_yaml(calibrated, calibrated))
+        arms = {"left": arm, "right": arm}
+        (tmp_path / f"{name}.yaml").write_text(calibration_yaml(arms, arms))
         rows = [(name, "k", seed, 35.1, 34, 36, 35.2, "", "", "") for seed in (1, 2)]
         INTERVALS.write(tmp_path / name / "seeds_1-2.csv", rows)
         targets.simulate_target(case, tmp_path / f"{name}.csv")
@@ -207,7 +207,8 @@ def test_the_bound_of_a_case_is_of_its_own_calibration(tmp_path: Path) -> None:
     for name, times in (("liquid_drop_1", 1.0), (CASE, 1000.0)):
         stiff = replace(arm, stiffness_Nm_per_rad=times * arm.stiffness_Nm_per_rad)
         files.append(tmp_path / f"{name}.yaml")
-        files[-1].write_text(calibration_yaml(*[CalibratedArm(stiff, arm)] * 2))
+        arms, known = ({"left": both, "right": both} for both in (stiff, arm))
+        files[-1].write_text(calibration_yaml(arms, known))
         of_targets.append(tmp_path / f"{name}.csv")
         targets.simulate_target(study.cases[name], of_targets[-1])
         batches.append(tmp_path / name / "seeds_0-1.csv")
@@ -218,9 +219,7 @@ def test_the_bound_of_a_case_is_of_its_own_calibration(tmp_path: Path) -> None:
     rows = coverage(study, of_targets, batches, files).rows
     for name, file, of_target in zip(study.cases, files, of_targets, strict=True):
         (shown,) = (row for row in rows if (row["case"], row["quantity"]) == (name, "c + c_p"))
-        alone = {
-            q.label: bound for q, bound in bounds_at_truth(study.cases[name], of_target, [file])
-        }
+        alone = bounds_at_truth(study.cases[name], of_target, [file])
         assert shown["bound_percent"] == pytest.approx(100 * alone["c + c_p"])
     ends = [row["bound_percent"] for row in rows if row["quantity"] == "c + c_p"]
     assert ends[1] > 10 * ends[0]

@@ -63,11 +63,6 @@ class Case(SampleCase):
         return self.block.models.target == "nonlinear"
 
     @property
-    def unilateral(self) -> bool:
-        """True if the jaws of the simulation cannot pull the sample."""
-        return self.block.contact == "unilateral"
-
-    @property
     def assumed_gripper(self) -> Gripper:
         """Gripper that identifications assume; a calibration replaces its arms."""
         assumed = self.block.assumed_gripper
@@ -140,8 +135,8 @@ class Study:
     @property
     def counted(self) -> list[str]:
         """Names of those of which every trace gets the verdicts that users are shown."""
-        covered = self.of(self.covered)
-        return covered._where(lambda case: case.block.identifiability.verdicts_every == 1)
+        cases = ((name, self.cases[name].block.identifiability) for name in self.covered)
+        return [name for name, block in cases if block.verdicts_every == 1]
 
     @property
     def published(self) -> list[str]:

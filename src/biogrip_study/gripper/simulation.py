@@ -45,8 +45,7 @@ def jaw_force(
     if nonlinear:
         # Arms with inertia have not moved yet at the instant of a step.
         instants = np.nextafter(time_s, -np.inf) if inertia else time_s
-        more = correction(gripper, network, course).checked().force_at(instants)
-        force += np.where(instants < 0, 0, more)
+        force += correction(gripper, network, course).checked().force_at(instants)
     return force
 
 

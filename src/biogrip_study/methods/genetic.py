@@ -22,7 +22,7 @@ from pydantic import Field
 from biogrip.arrays import IntArray
 from biogrip.fit.problem import Fit, History, HistoryRow, ReportProgress, TraceProblem, silent
 from biogrip.keys import Block, Complaint
-from biogrip_study.methods.genome import Chromosomes, Genome, make_genome
+from biogrip_study.methods.genome import Chromosomes, Genome
 from biogrip_study.methods.misfit import make_misfits
 
 _LARGEST_SETTING = 1_000_000
@@ -78,7 +78,7 @@ def identify_many(
 ) -> list[Fit]:
     """Identify samples of one model by the paper's genetic algorithm, all at once."""
     misfits = make_misfits([problem.residuals for problem in problems])
-    genome = make_genome(problems[0].ranges)
+    genome = Genome(problems[0].ranges)
 
     def ranked(chromosomes: Chromosomes, populations: IntArray) -> Ranking:
         misfit = misfits(genome.decode(chromosomes), populations).astype(np.float32)
@@ -96,7 +96,7 @@ def identify_many(
     drawn = [genome.draw(settings.population, rng) for rng in rngs]
     # In single bytes, which sorting and crossover copy in half of the time.
     everyone: Chromosomes = np.stack(drawn).astype(np.int8)
-    survivors, ranking = select(everyone, ranked(everyone, running), genome, settings.survivors)
+    survivors, ranking = select(everyone, ranked(everyone, running), settings.survivors)
     improved, stalled = np.zeros_like(running), np.zeros(len(rngs), dtype=bool)
     courses: list[list[HistoryRow]] = [[] for _ in rngs]
     evaluations = settings.population
@@ -120,7 +120,7 @@ def identify_many(
                 survivors, ranking = survivors[:, :1], ranking[:, :1]
         everyone = np.concatenate((survivors, children), axis=1)
         ranking = np.concatenate((ranking, ranked(children, running)), axis=1)
-        survivors, ranking = select(everyone, ranking, genome, settings.survivors)
+        survivors, ranking = select(everyone, ranking, settings.survivors)
         improved[running[ranking[:, 0] < before]] = generation
         evaluations += children.shape[1]
         evaluations_of_all += children.shape[1] * len(running)
@@ -135,15 +135,13 @@ def identify_many(
     return fits
 
 
-def select(
-    chromosomes: Chromosomes, ranking: Ranking, genome: Genome, count: int
-) -> tuple[Chromosomes, Ranking]:
+def select(chromosomes: Chromosomes, ranking: Ranking, count: int) -> tuple[Chromosomes, Ranking]:
     """Select the best individuals of each population by their misfits, best first.
 
     Chromosomes are (n_populations, n, n_genes), misfits (n_populations, n). NaN is ranked last. Of
     equals the one with the lowest genes is first.
     """
-    keys: list[NDArray[Any]] = [*genome.keys(chromosomes), ranking]
+    keys: list[NDArray[Any]] = [*np.moveaxis(chromosomes, -1, 0)[::-1], ranking]
     order = np.lexsort(keys)[:, :count]
     return _taken(chromosomes, order), _taken(ranking, order)
 
@@ -197,7 +195,7 @@ def _cuts(
         return np.repeat(ends - genome.sizes + within, genome.sizes, axis=1)
     if settings.cut == "between" and len(ends) > 1:
         return rng.choice(ends[:-1], size=(pairs, 1))
-    last = genome.genes - 1
+    last = len(genome.low) - 1
     return rng.integers(min(1, last), last, size=(pairs, 1), endpoint=True)
 
 
@@ -211,6 +209,6 @@ def mutate(
     for population, rng in zip(chromosomes, rngs, strict=True):
         mutating = np.flatnonzero(rng.random(len(population)) < settings.mutation_probability)
         for _ in range(settings.mutated_genes):
-            gene = rng.integers(genome.genes, size=len(mutating))
+            gene = rng.integers(len(genome.low), size=len(mutating))
             low, high = genome.low[gene], genome.high[gene]
             population[mutating, gene] = rng.integers(low, high, endpoint=True)

@@ -162,6 +162,27 @@ def read_verdicts(path: Path) -> dict[str, Any]:
     return read_object(path, "verdicts")
 
 
+def values_by_quantity(runs: "pd.DataFrame", model: SampleModel) -> "dict[str, pd.Series[float]]":
+    """Return what runs found of every parameter and of the sum of the exchangeable ones, by name.
+
+    Parameters
+    ----------
+    runs
+        Identifications, a row a run.
+    model
+        Sample model, whose parameters have columns.
+
+    Returns
+    -------
+    dict
+        Values in SI units, (n_runs,) each, by the labels of `parameters_and_sum`.
+    """
+    return {
+        " + ".join(p.name for p in group): runs[[p.column for p in group]].sum(axis=1)
+        for group in model.quantities
+    }
+
+
 ALL = "all"
 """Name of the basin of all runs."""
 _LEAST_SHARE_OF_BASIN = 0.1

@@ -23,7 +23,7 @@ from biogrip.terminal import Progress
 from biogrip_study.config.study import Case
 from biogrip_study.gripper.calibration import with_calibration
 from biogrip_study.methods.genome import lowest_encodable
-from biogrip_study.methods.registry import identifier
+from biogrip_study.methods.registry import identify_by
 from biogrip_study.records.identifications import (
     ENCODABLE,
     MODEL_FITS,
@@ -53,7 +53,7 @@ def identify_seeds(
     history: Path,
 ) -> None:
     """Identify a batch of seeds with one method."""
-    identified = identifier(method, case.block.method(method))
+    identified = partial(identify_by, method, case.block.method(method))
     recorded = read_measurements(measurements, list(seeds))
     experiment = experiment_for(case.experiment, recorded, calibrated).to_identify()
     progress = Progress(f"{case.name}, {method}", len(seeds))
@@ -141,7 +141,7 @@ def experiment_for(
     """Return the experiment that traces of a case are identified by: see `for_trace`."""
     experiment = with_calibration(experiment, calibrated)
     if experiment.simulated:
-        return experiment.weighted(measurements.sd)
+        return experiment
     # Imported here: of a simulated trace nothing has to be judged.
     from biogrip.identify.prepare import for_trace
 

@@ -9,7 +9,7 @@ from scipy.special import betaincinv
 
 from biogrip.fit.nested_fits import aic_and_bic
 from biogrip.judging.likelihood import least_sd
-from biogrip.judging.quantities import Quantity, parameters_and_sum, quantity_value
+from biogrip.judging.quantities import parameters_and_sum, quantity_value
 from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
 from biogrip.levels import WIDE
 from biogrip.physics.noise import standard_deviation
@@ -24,6 +24,7 @@ from biogrip_study.records.identifications import (
     reached_encodable,
     read_identifications,
     share_with_limits,
+    values_by_quantity,
 )
 from biogrip_study.records.rows import require_rows, seeds_of
 from biogrip_study.records.traces import read_target
@@ -55,17 +56,15 @@ def methods(study: Study, identifications: list[Path]) -> ShownTable:
                 "case": name,
                 "method": METHODS[method].title,
                 "seeds": len(mine),
-                "median_rise": np.median(mine["increase"]),
-                "encodable_rise": np.median(mine["least"]),
-                "median_evaluations": float(mine["evaluations"].median()),
+                "median_rise": mine["increase"].median(),
+                "encodable_rise": mine["least"].median(),
+                "median_evaluations": mine["evaluations"].median(),
             }
             shares = share_with_limits(int(mine["reached"].sum()), len(mine))
             row |= zip(("reached_share", "reached_low", "reached_high"), shares, strict=True)
-            for quantity in case.sample.model.quantities:
-                label = " + ".join(p.name for p in quantity)
-                values = mine[[p.column for p in quantity]].sum(axis=1).to_numpy(float)
-                error = np.abs(error_percent(quantity_value(label, case.parameters), values))
-                row[f"error_percent {label}"] = np.median(error)
+            for label, values in values_by_quantity(mine, case.sample.model).items():
+                error = error_percent(quantity_value(label, case.parameters), values)
+                row[f"error_percent {label}"] = abs(error).median()
                 labels[f"error_percent {label}"] = f"Error {label} %"
             rows.append(row)
     errors = (Column(name, heading, 2) for name, heading in labels.items())
@@ -154,22 +153,19 @@ def coverage(
     Targets are files of all cases, in their order; calibrated grippers are named like their case.
     """
     rows: list[Row] = []
-    estimated = pd.concat([read_intervals(study, path) for path in intervals], ignore_index=True)
-    for (name, case), target in zip(study.cases.items(), targets, strict=True):
-        of_case = estimated[estimated["case"] == name]
-        of_calibration = [file for file in calibrated if file.stem == name]
-        for quantity, limit in bounds_at_truth(case, target, of_calibration):
-            mine = of_case[of_case["quantity"] == quantity.label]
-            fitted = mine[mine["estimate_rest_known"].notna()]
-            shown = mine[mine["verdict"].notna()]
-            if fitted.empty and not np.any(shown["verdict"] != NOT_DETERMINED):
-                continue
-            truth = quantity_value(quantity.label, case.parameters) or 0.0
-            head = {"case": name, "quantity": quantity.label, "unit": quantity.unit}
-            numbers = _spreads(fitted, truth, 100 * limit, case.confidence) | _verdicts_shown(
-                shown, truth
-            )
-            rows.append({**head, "target": truth, **numbers})
+    bounds = {
+        name: bounds_at_truth(case, target, [file for file in calibrated if file.stem == name])
+        for (name, case), target in zip(study.cases.items(), targets, strict=True)
+    }
+    for case, head, estimated in _by_quantity(study, intervals):
+        fitted = estimated[estimated["estimate_rest_known"].notna()]
+        shown = estimated[estimated["verdict"].notna()]
+        if fitted.empty and not np.any(shown["verdict"] != NOT_DETERMINED):
+            continue
+        truth = head["target"] or 0.0
+        limit = 100 * bounds[case.name][head["quantity"]]
+        of_fits = _spreads(fitted, truth, limit, case.confidence)
+        rows.append({**head, "target": truth, **of_fits, **_verdicts_shown(shown, truth)})
     caption = (
         "Least squares over many seeds, for every quantity that a case's traces should determine: "
         "standard deviation of the estimates' logarithms beside the Cramér-Rao bound, and how "
@@ -184,10 +180,21 @@ def coverage(
     return ShownTable(caption, _COVERAGE_COLUMNS, rows)
 
 
-def bounds_at_truth(
-    case: Case, target: Path, calibrated: Sequence[Path]
-) -> list[tuple[Quantity, float]]:
-    """Return what is searched of a case, each with its Cramér-Rao bound at the true parameters.
+def _by_quantity(
+    study: Study, intervals: Sequence[Path]
+) -> Iterator[tuple[Case, Row, pd.DataFrame]]:
+    """Yield what the first columns say of every quantity of a case, and its rows of all batches."""
+    estimated = pd.concat([read_intervals(study, path) for path in intervals], ignore_index=True)
+    for name, case in study.cases.items():
+        of_case = estimated[estimated["case"] == name]
+        for quantity in parameters_and_sum(case.experiment.searched):
+            target = quantity_value(quantity.label, case.parameters)
+            head = {"case": name, "quantity": quantity.label, "unit": quantity.unit}
+            yield case, head | {"target": target}, of_case[of_case["quantity"] == quantity.label]
+
+
+def bounds_at_truth(case: Case, target: Path, calibrated: Sequence[Path]) -> dict[str, float]:
+    """Return the Cramér-Rao bound of what is searched of a case, at the true parameters, by label.
 
     That is the standard deviation of the quantity's logarithm.
     """
@@ -196,10 +203,10 @@ def bounds_at_truth(
     log_truth = experiment.logs(case.parameters)
     _, sensitivity = experiment.of(time_s, rotation).residuals(log_truth)
     noise_sd = standard_deviation(rotation, case.noise)
-    quantities = parameters_and_sum(experiment.searched)
-    return [
-        (quantity, least_sd(sensitivity, noise_sd, log_truth, quantity)) for quantity in quantities
-    ]
+    return {
+        quantity.label: least_sd(sensitivity, noise_sd, log_truth, quantity)
+        for quantity in parameters_and_sum(experiment.searched)
+    }
 
 
 def read_intervals(study: Study, path: Path) -> pd.DataFrame:
@@ -279,15 +286,11 @@ _COUNT_COLUMNS = (
 
 def verdict_counts(study: Study, intervals: list[Path]) -> ShownTable:
     """Count verdicts of whole profiles, and those whose limits hold the true value."""
-    rows: list[Row] = []
-    estimated = pd.concat([read_intervals(study, path) for path in intervals], ignore_index=True)
-    for name, case in study.cases.items():
-        of_case = estimated[estimated["case"] == name]
-        for quantity in parameters_and_sum(case.experiment.searched):
-            mine = of_case[(of_case["quantity"] == quantity.label) & of_case["verdict"].notna()]
-            target = quantity_value(quantity.label, case.parameters)
-            head: Row = {"case": name, "quantity": quantity.label, "unit": quantity.unit}
-            rows += [head | row for row in _counts(mine, target)]
+    rows = [
+        head | row
+        for _, head, estimated in _by_quantity(study, intervals)
+        for row in _counts(estimated[estimated["verdict"].notna()], head["target"])
+    ]
     percents = " or ".join(sorted({f"{100 * case.confidence:g}" for case in study.cases.values()}))
     caption = (
         f"Verdicts from whole profiles at {percents} %, as users are shown them, in every seed: "
@@ -300,7 +303,7 @@ def verdict_counts(study: Study, intervals: list[Path]) -> ShownTable:
 def _counts(judged: pd.DataFrame, target: float | None) -> Iterator[Row]:
     for verdict, mine in judged.groupby("verdict"):
         count = len(mine)
-        row: Row = {"target": target, "verdict": verdict, "seeds": len(judged), "reached": count}
+        row: Row = {"verdict": verdict, "seeds": len(judged), "reached": count}
         row |= _interval("reached", count, len(judged))
         if verdict == DETERMINED:
             row["narrow"] = np.sum(mine["shown_high"] <= WIDE**2 * mine["shown_low"])
