@@ -12,82 +12,53 @@ from biogrip.arrays import Array
 from biogrip.command.options import GROUPS
 from biogrip.errors import BiogripError
 from biogrip.physics.instruments import INSTRUMENTS, PARTNERS
-from biogrip.traces.columns import AXES, plain_name, unit_of
+from biogrip.traces.columns import plain_name
 
-FIELDS = (
+KNOWN = yaml.safe_load(Path(__file__).with_name("known.yaml").read_text("utf-8"))
+"""Words of columns, examples and drawings."""
+
+TICKED = "offset", "contact", "no-compare"
+_TYPED = (
     *("time", "frequency", "block", "rows", "hold", "load", "ramp", "shape", "contact", "start"),
     *("from", "until", "model"),
 )
-"""Options that have a field of the same name."""
+_OF_COLUMNS = "kind", "reading", "column", "partner", "partner_column"
+CHOICES = (*_OF_COLUMNS, *_TYPED, *TICKED, "more", "across", "upward", "by", "unit")
+"""All that can be chosen, as text: options by their names, more options, columns of pictures."""
 
-CHOICES = (
-    *("kind", "reading", "column", "partner", "partner_column", *FIELDS, "offset", "no-compare"),
-    *("more", "across", "upward", "by", "unit"),
-)
-"""All that can be chosen, as text; nothing by default."""
-
-OF_TIME = "time", "hold", "load", "ramp", "contact", "start", "offset"
-"""What a sweep does not have."""
-
-_SWITCHES = {
-    prefix + name[2:]
-    for options in GROUPS.values()
-    for name, metavar, *_ in options
-    for prefix in ("--", "--no-")
-    if not metavar
-} | {"--no-compare"}
-_WORDS = yaml.safe_load(Path(__file__).with_name("likely.yaml").read_text("utf-8"))
-_CHANNELS = [each for of in INSTRUMENTS.values() for each in (of.read, *of.partners)]
+# What a sweep does not have, and what only that has.
+_OF_TIME, _OF_SWEEPS = {"time", "hold", "load", "ramp", "contact", "start", "offset"}, {"frequency"}
+_TAKES_VALUE = {name: bool(metavar) for of in GROUPS.values() for name, metavar, *_ in of}
+_TAKES_VALUE |= {"--no-offset": False, "--no-drift": False, "--no-compare": False}
 _OPTION = re.compile(r"(--[a-z-]+)(?: ((?:'[^']*'|\"[^\"]*\"|[^\s'\"])+?))?(?=[.,;:)]*(?:\s|$))")
 _PLACEHOLDER = re.compile(r"(^|=)[A-Z]+$")
 _UNITS_ALLOWED = re.compile(r"allowed are ([^.;:]+?)(?:, or |, by |[.;]|$)")
 
 
-def likely_choices(
-    names: Sequence[str], units: Sequence[str] | None, numbers: Callable[[str], Array]
-) -> dict[str, str]:
+def likely_choices(names: Sequence[str], numbers: Callable[[str], Array]) -> dict[str, str]:
     """Return which columns probably have what, and what was done then.
 
     Of a load and a deformation, that of fewer different numbers was held.
     """
     columns: dict[str, str] = {}
-    for with_unit in (True, False):
-        for name, unit in zip(names, units or [""] * len(names), strict=False):
-            quantity = _quantity_of(name, unit, with_unit=with_unit)
-            if name not in columns.values():
-                columns.setdefault(quantity, name)
-    partners = [name for name in PARTNERS if name in columns]
-    some = [name for name in INSTRUMENTS if name in columns]
-    some = [name for name in some if INSTRUMENTS[name].sweeps == ("frequency" in columns)] or some
-    some.sort(key=lambda name: INSTRUMENTS[name].relative, reverse=True)
-    reading, *others = some or ["strain"]
+    for name in names:
+        words = plain_name(name).replace("_", " ")
+        likely = (own for own, pattern in KNOWN["words"].items() if re.search(pattern, words))
+        columns.setdefault(next(likely, ""), name)
+    swept = [name for name in columns if name in INSTRUMENTS and INSTRUMENTS[name].sweeps]
+    read = swept if "frequency" in columns else [own for own in INSTRUMENTS if own in columns]
+    reading = max(read, key=lambda name: INSTRUMENTS[name].relative, default="strain")
     load = "" if INSTRUMENTS[reading].relative else INSTRUMENTS[reading].controlled.name
-    load = load if load in others else ""
-    if load and _steps(numbers(columns[reading])) < _steps(numbers(columns[load])):
+    if load in columns and _steps(numbers(columns[reading])) < _steps(numbers(columns[load])):
         reading, load = load, reading
-    return {
-        **{"across": columns.get("frequency", columns.get("time", ""))},
-        **{"upward": columns.get(reading, "")},
-        **{axis: columns.get(axis, "") for axis in AXES},
-        **{"kind": INSTRUMENTS[reading].kind, "reading": reading},
-        **{"column": columns.get(reading, ""), "load": columns.get(load, "")},
-        **({"partner": partners[0], "partner_column": columns[partners[0]]} if partners else {}),
-    }
-
-
-def _quantity_of(name: str, unit: str, *, with_unit: bool) -> str:
-    words = plain_name(name).replace("_", " ")
-    for quantity in (each for each, of in _WORDS.items() if re.search(of, words, re.I)):
-        allowed = dict(AXES.get(quantity, {}))
-        for channel in _CHANNELS:
-            allowed |= channel.units if channel.name == quantity else {}
-        try:
-            unit_of(None, name, None, allowed, "", unit)
-        except BiogripError:
-            if with_unit:
-                continue
-        return str(quantity)
-    return ""
+    partner = next((name for name in PARTNERS if name in columns), "")
+    chosen = {"reading": reading, "column": reading, "partner": partner, "load": load}
+    of_columns = {**chosen, "upward": reading, "partner_column": partner}
+    of_columns |= {"time": "time", "frequency": "frequency"}
+    likely_names = {key: columns.get(quantity, "") for key, quantity in of_columns.items()}
+    across = likely_names["frequency"] or likely_names["time"]
+    kind = INSTRUMENTS[reading].kind
+    return {**likely_names, "across": across, "kind": kind, "reading": reading, "partner": partner}
 
 
 def _steps(values: Array) -> int:
@@ -98,34 +69,30 @@ def _steps(values: Array) -> int:
 
 def options_typed(chosen: Mapping[str, str]) -> list[str]:
     """Return what is chosen as it is typed; a `BiogripError` has a quote without an end."""
-    sweeps = chosen["kind"] == "oscillation"
-    hidden = OF_TIME if sweeps else ("frequency", "partner_column")
-    shown = {name: text for name, text in chosen.items() if text and name not in hidden}
-    typed: list[str] = []
-    for quantity, column in (("reading", "column"), ("partner", "partner_column")):
-        typed += ["--reading", f"{chosen[quantity]}={shown[column]}"] if column in shown else []
-    for name in filter(shown.__contains__, FIELDS):
-        typed += [f"--{name}", shown[name]]
+    hidden = _OF_TIME if chosen["kind"] == "oscillation" else _OF_SWEEPS
+    pairs = [("--reading", chosen["reading"], chosen["column"])] * bool(chosen["column"])
+    if hidden is _OF_TIME and chosen["partner_column"]:
+        pairs.append(("--reading", chosen["partner"], chosen["partner_column"]))
+    typed = [word for option, *of in pairs for word in (option, "=".join(of))]
+    for name in CHOICES[len(_OF_COLUMNS) :]:
+        if chosen[name] and f"--{name}" in _TAKES_VALUE and name not in hidden:
+            typed += [f"--{name}", chosen[name]][: 1 + _TAKES_VALUE[f"--{name}"]]
     try:
-        more = shlex.split(chosen["more"])
+        return [*typed, *shlex.split(chosen["more"])]
     except ValueError as error:
         raise BiogripError(f"more options: {error}.") from error
-    switches = (f"--{name}" for name in ("offset", "no-compare") if name in shown)
-    return [*typed, *switches, *more]
 
 
-def with_option(chosen: Mapping[str, str], option: str, value: str) -> dict[str, str]:
-    """Return choices with an option: in its field, or else among more options."""
-    name, (quantity, _, column) = option.removeprefix("--"), value.partition("=")
+def with_option(option: str, value: str, more: str) -> dict[str, str]:
+    """Return what to choose for an option: its field, or else more options."""
+    quantity, _, column = value.partition("=")
     if option == "--reading" and quantity in PARTNERS:
-        return {**chosen, "partner": quantity, "partner_column": column}
+        return {"partner": quantity, "partner_column": column}
     if option == "--reading" and quantity in INSTRUMENTS:
-        kind = INSTRUMENTS[quantity].kind
-        return {**chosen, "kind": kind, "reading": quantity, "column": column}
-    if name in (*FIELDS, "offset", "no-compare"):
-        return {**chosen, name: value or "on"}
-    more = shlex.join(filter(None, (option, value)))
-    return {**chosen, "more": f"{chosen['more']} {more}".strip()}
+        return {"kind": INSTRUMENTS[quantity].kind, "reading": quantity, "column": column}
+    if (name := option.removeprefix("--")) in CHOICES:
+        return {name: value or "on"}
+    return {"more": f"{more} {shlex.join(filter(None, (option, value)))}".strip()}
 
 
 def remedies_in(message: str) -> dict[tuple[str, str], str]:
@@ -135,11 +102,11 @@ def remedies_in(message: str) -> dict[tuple[str, str], str]:
     """
     remedies: dict[tuple[str, str], str] = {}
     for option, written in _OPTION.findall(message):
-        value = "".join(shlex.split(written)) if option not in _SWITCHES else ""
-        units = _UNITS_ALLOWED.search(message) if value.endswith("=UNIT") else None
-        for unit in re.split(", | or ", units[1]) if units else ():
-            remedies[option, value.replace("UNIT", unit)] = unit
-        known = option in _SWITCHES or any(option == own[0] for of in GROUPS.values() for own in of)
-        if known and bool(value) != (option in _SWITCHES) and not _PLACEHOLDER.search(value):
+        takes = _TAKES_VALUE.get(option)
+        value = "".join(shlex.split(written)) if takes else ""
+        if value.endswith("=UNIT") and (units := _UNITS_ALLOWED.search(message)):
+            for unit in re.split(", | or ", units[1]):
+                remedies[option, value.replace("UNIT", unit)] = unit
+        elif takes == bool(value) and not _PLACEHOLDER.search(value):
             remedies[option, value] = shlex.join(filter(None, (option, value)))
     return remedies

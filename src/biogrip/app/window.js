@@ -17,10 +17,10 @@ async function answered(action, more) {
     for (const each of [value].flat()) body.append(name, each);
   const answer = await fetch(action, { method: "POST", body }).catch(() => null);
   if (!answer) return fail("The program has ended. Start it again: biogrip app.");
-  const text = await answer.text();
-  if (!answer.ok) return fail(text);
+  const page = new DOMParser().parseFromString(await answer.text(), "text/html");
+  if (!answer.ok) return fail(`${page.title}: ${page.querySelector("p")?.textContent}`);
   fail("");
-  show(new DOMParser().parseFromString(text, "text/html"), new Map(new FormData(form)), sent);
+  show(page, new Map(new FormData(form)), sent);
 }
 
 function fail(text) {

@@ -9,13 +9,16 @@ import time
 from base64 import b64decode
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from shlex import join
 from threading import Lock, Timer
-from typing import IO, Any
+from typing import IO
+
+import numpy as np
 
 from biogrip.app.choices import CHOICES, likely_choices, options_typed
-from biogrip.app.preview import Preview, previewed
+from biogrip.arrays import Array
 from biogrip.cli import options_of
 from biogrip.command.files import traces_of
 from biogrip.command.settings import Asked, check_settings, read_trace
@@ -23,34 +26,52 @@ from biogrip.command.sheet import is_table
 from biogrip.command.words import limits_in_short
 from biogrip.errors import BiogripError
 from biogrip.terminal import visible
-from biogrip.traces.reader import Recording, form_in_words
+from biogrip.traces.reader import Recording
+from biogrip.traces.tables import Sheet, Table, find_marks, is_clock, overview, seconds_or_inf
 
 MOST_FILES, LONGEST_S = 500, 1800
 """Files of a window at most, and the time after which its command is stopped."""
 
 _UNSAFE = re.compile(r"[^\w .,=()+-]|^[ .-]+")
-_LONGEST_NAME = 100
 _CONFIGS = ".yaml", ".yml"
+_LONGEST_NAME, _ROWS_SHOWN, _MOST_POINTS = 100, 6, 1000
 # So many traces of a table are checked before all run.
 _CHECKED = 3
 _PICTURE = re.compile(rb'<img class="(?:fit-picture|all)" src="data:image/png;base64,([^"]+)"')
 
 
 @dataclass(frozen=True)
-class Checked:
-    """What the command would do with what is chosen."""
+class Preview:
+    """A file as it was read, before anybody says which columns are to be used."""
 
-    problem: str = ""
-    """Why it would refuse it."""
-    traces: tuple[Asked, ...] = ()
-    recording: Recording | None = None
-    """The first trace."""
-    read_as: str = ""
+    sheet: Sheet
+    tables: list[Table]
+    table: Table
+    """The one that is shown."""
 
     @property
-    def copied(self) -> list[str]:
-        """Columns of a table of traces that set nothing: groups, dishes, ..."""
-        return [*dict.fromkeys(name for own in self.traces for name in own.copied if name)]
+    def rows(self) -> list[list[str]]:
+        """Its first rows."""
+        rows = slice(self.table.first, min(self.table.first + _ROWS_SHOWN, self.table.end))
+        return [[*map(str, row)] for row in self.sheet.cells[rows, : len(self.table.names)]]
+
+    @cached_property
+    def points(self) -> dict[str, list[float | None]]:
+        """Numbers of every column, of some rows; None for none."""
+        every = -(-(self.table.end - self.table.first) // _MOST_POINTS) or 1
+        names = filter(None, self.table.names)
+        columns = {name: self.numbers(name)[::every].tolist() for name in names}
+        return {
+            name: [value if np.isfinite(value) else None for value in values]
+            for name, values in columns.items()
+        }
+
+    def numbers(self, name: str) -> Array:
+        """Return the numbers of a column, (n_rows,), times of day in s; NaN or inf for others."""
+        rows = slice(self.table.first, self.table.end)
+        cells = [*map(str, self.sheet.cells[rows, self.table.names.index(name)])]
+        marks = find_marks(cells, self.sheet.separator)
+        return np.array([*map(seconds_or_inf if is_clock(cells) else marks.number, cells)], float)
 
 
 @dataclass
@@ -61,28 +82,29 @@ class Window:
     """Folder of the files; what the command writes is in others beside it."""
     names: list[str] = field(default_factory=list)
     chosen: dict[str, str] = field(default_factory=lambda: dict.fromkeys(CHOICES, ""))
+    lock: Lock = field(default_factory=Lock)
+    preview: Preview | None = None
+    """How the first trace looks."""
+    command: str = ""
+    """What gives the same in a terminal."""
+    problem: str = ""
+    """Why it would be refused."""
+    traces: list[Asked] = field(default_factory=list)
+    recording: Recording | None = None
+    """The first trace, as it is read."""
     work: subprocess.Popen[bytes] | None = None
     """The command, while it runs and when it has ended."""
     out: Path = Path()
     started: float = 0.0
     compared: str = ""
     """What the comparison of groups says."""
-    lock: Lock = field(default_factory=Lock)
-    _checked: tuple[Any, Checked] = (None, Checked())
 
     def add(self, name: str, content: IO[bytes]) -> None:
         """Keep a file under a name of letters, digits and few marks, in no other folder."""
         plain = _UNSAFE.sub("_", re.split(r"[/\\]", name)[-1])[-_LONGEST_NAME:] or "_"
-        if len({*self.names, plain}) > MOST_FILES:
-            raise BiogripError(f"found more than {MOST_FILES} files; allowed are fewer.")
-        (self.folder / plain).write_bytes(content.read())
-        self.names = [*dict.fromkeys([*self.names, plain])]
-
-    def choose_likely(self) -> None:
-        """Choose what names and units of the columns tell."""
-        preview = self.preview()
-        table = preview.table
-        self.chosen |= likely_choices(table.names, table.units, preview.numbers)
+        self.names = [*dict.fromkeys([*self.names, plain])][:MOST_FILES]
+        if plain in self.names:
+            (self.folder / plain).write_bytes(content.read())
 
     @property
     def inputs(self) -> list[str]:
@@ -97,53 +119,45 @@ class Window:
         config = ["--config", configs[-1]] if configs else []
         return ["identify", *self.inputs, *options_typed(self.chosen), *config]
 
-    @property
-    def command(self) -> str:
-        """What gives the same in a terminal."""
-        return join(["biogrip", *self.typed, "--report", "page.html", "--csv", "table.csv"])
-
-    def preview(self) -> Preview:
-        """Return how the first trace looks, in the block that is chosen."""
+    def look(self) -> None:
+        """Read the first trace; if nothing is chosen yet, choose what names of columns tell."""
+        self.preview = None
         names = [name for name in self.names if not name.endswith(_CONFIGS)]
-        path = self.folder / next((own for own in names if own not in self.inputs), names[0])
-        return previewed(path, path.stat().st_mtime_ns, self.chosen["block"])
+        first = next((name for name in names if name not in self.inputs), names[0])
+        sheet, tables = overview(self.folder / first)
+        block, longest = self.chosen["block"], max(tables, key=lambda it: it.end - it.first)
+        shown = dict(enumerate(tables, 1)).get(int(block) if block.isdecimal() else 0, longest)
+        self.preview = Preview(sheet, tables, shown)
+        if not self.chosen["column"]:
+            self.chosen |= likely_choices([*filter(None, shown.names)], self.preview.numbers)
 
-    def checked(self) -> Checked:
-        """Return what the command would do; of the same choices it is found once."""
-        times = [(name, (self.folder / name).stat().st_mtime_ns) for name in self.names]
-        if self._checked[0] != (times, self.chosen):
-            self._checked = (times, {**self.chosen}), self._check()
-        return self._checked[1]
-
-    def _check(self) -> Checked:
-        traces: list[Asked] = []
+    def check(self) -> None:
+        """Find out what the command would do with what is chosen."""
+        self.command, self.problem, self.traces, self.recording = "", "", [], None
         try:
-            traces += self._traces()
-            check_settings(traces[:_CHECKED])
-            recording, _ = read_trace(traces[0])
+            self.look()
+            written = ["--report", "page.html", "--csv", "table.csv"]
+            self.command = join(["biogrip", *self.typed, *written])
+            self.traces = self._traces()
+            check_settings(self.traces[:_CHECKED])
+            self.recording, _ = read_trace(self.traces[0])
         except BiogripError as error:
-            return Checked(self.shown(error), tuple(traces))
-        said = [form_in_words(Path(traces[0].trace.name), recording.form), *recording.remarks()]
-        return Checked("", tuple(traces), recording, "\n".join(said))
+            self.problem = self.shown(error)
 
     def _traces(self) -> list[Asked]:
         """Return what is asked; a `BiogripError` says what the window does not do."""
         given = options_of(self.typed)
         config = given.pop("config", None)
-        if more := {*given} - {"files", "settings", "command"}:
-            text = "is not for more options: the window writes what you can download."
-            raise BiogripError(f"--{min(more)}: {text}")
-        if config is not None and str(config) not in self.names:
-            raise BiogripError("--config: drop the file; its name alone is allowed.")
-        files, config = (
-            [self.folder / name for name in self.inputs],
-            config and self.folder / config,
-        )
-        traces = traces_of(files, config, given["settings"])
+        others = {*given} - {"files", "settings", "command"}
+        if others or (config and str(config) not in self.names):
+            text = "not here; results can be downloaded, and a config is dropped."
+            raise BiogripError(f"--{min(others, default='config')}: {text}")
+        files = [self.folder / name for name in self.inputs]
+        traces = traces_of(files, config and self.folder / config, given["settings"])
         for own in traces:
             if own.trace.resolve().parent != self.folder:
-                found = f"found '{visible(own.trace)}', which is not among the dropped files"
-                raise BiogripError(f"{own.place}: {found}; allowed are their names.")
+                found = f"found '{visible(own.trace)}', allowed are names of dropped files"
+                raise BiogripError(f"{own.place}: {found}.")
         return traces
 
     def shown(self, message: object) -> str:
@@ -163,21 +177,24 @@ class Window:
     @property
     def of_table(self) -> bool:
         """True of several traces, or of a table of them."""
-        traces = self.checked().traces
-        return len(traces) > 1 or any(own.place != Asked.place for own in traces)
+        return len(self.traces) > 1 or any(own.place != Asked.place for own in self.traces)
+
+    @property
+    def copied(self) -> list[str]:
+        """Columns of a table of traces that set nothing: groups, dishes, ..."""
+        return [*dict.fromkeys(name for own in self.traces for name in own.copied if name)]
 
     def start(self) -> None:
         """Start the command in a process of its own, in place of what ran before."""
         self.stop()
-        self._traces()
         self.started, self.compared = time.time(), ""
         self.out = self.folder.with_name(f"{self.folder.name} {time.monotonic_ns()}")
         self.out.mkdir()
-        outputs = ["--report", str(self.out / "page.html"), "--csv", str(self.out / "table.csv")]
-        outputs += [] if self.of_table else ["--output", str(self.out / "result.json")]
-        command = [sys.executable, "-m", "biogrip", *self.typed, *outputs]
-        with (self.out / "said").open("wb") as said:
-            self.work = subprocess.Popen(command, cwd=self.folder, stdout=said, stderr=said)
+        names = {"--report": "page.html", "--csv": "table.csv", "--output": "result.json"}
+        outputs = [f"{option}={self.out / name}" for option, name in names.items()]
+        command = [sys.executable, "-m", "biogrip", *self.typed, *outputs[: 3 - self.of_table]]
+        with (self.out / "stdout").open("wb") as stdout, (self.out / "stderr").open("wb") as stderr:
+            self.work = subprocess.Popen(command, cwd=self.folder, stdout=stdout, stderr=stderr)
         limit = Timer(LONGEST_S, self.work.send_signal, [signal.SIGINT])
         limit.daemon = True
         limit.start()
@@ -188,16 +205,15 @@ class Window:
             self.work.send_signal(signal.SIGINT)
             self.work.wait()
 
-    def said(self) -> str:
+    def said(self, stream: str) -> str:
         """Return what the command has printed, but for the files that it has written."""
-        said = (self.out / "said").read_text("utf-8")
+        said = (self.out / stream).read_text("utf-8")
         return self.shown(re.sub(r"(?m)^Written to .*$", "", said).strip())
 
     def compare(self) -> None:
         """Compare groups of the traces, by columns of their table."""
         by = [f"--{name}={self.chosen[name]}" for name in ("by", "unit") if self.chosen[name]]
-        typed = ["groups", "table.csv", *by]
-        typed += ["--csv", "groups.csv", "--plot", "groups.png"]
+        typed = ["groups", "table.csv", *by, "--csv", "groups.csv", "--plot", "groups.png"]
         command = [sys.executable, "-m", "biogrip", *typed]
         ended = subprocess.run(command, cwd=self.out, capture_output=True, text=True, timeout=60)
         self.compared = f"{join(['biogrip', *typed])}\n\n{ended.stderr}{ended.stdout}"
@@ -205,8 +221,8 @@ class Window:
     def done(self) -> list[tuple[str, Mapping[str, str]]]:
         """Return what is known of each of several traces: nothing while it waits."""
         rows: list[tuple[str, Mapping[str, str]]] = []
-        for own in self.checked().traces:
-            data: dict[str, Any] = {"fit": "", "quantities": []}
+        for own in self.traces:
+            data = {"fit": "", "quantities": []}
             if own.output.exists() and own.output.stat().st_mtime > self.started:
                 data = json.loads(own.output.read_text("utf-8"))
             told = {it["quantity"]: limits_in_short(it) for it in data["quantities"]}
