@@ -2,7 +2,7 @@
 
 import re
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -35,13 +35,13 @@ _PLACEHOLDER = re.compile(r"(^|=)[A-Z]+$")
 _UNITS_ALLOWED = re.compile(r"allowed are ([^.;:]+?)(?:, or |, by |[.;]|$)")
 
 
-def likely_choices(names: Sequence[str], numbers: Callable[[str], Array]) -> dict[str, str]:
-    """Return which columns probably have what, and what was done then.
+def likely_choices(numbers: Mapping[str, Array]) -> dict[str, str]:
+    """Return which columns of numbers by name probably have what, and what was done then.
 
     Of a load and a deformation, that of fewer different numbers was held.
     """
     columns: dict[str, str] = {}
-    for name in names:
+    for name in numbers:
         words = plain_name(name).replace("_", " ")
         likely = (own for own, pattern in KNOWN["words"].items() if re.search(pattern, words))
         columns.setdefault(next(likely, ""), name)
@@ -49,16 +49,14 @@ def likely_choices(names: Sequence[str], numbers: Callable[[str], Array]) -> dic
     read = swept if "frequency" in columns else [own for own in INSTRUMENTS if own in columns]
     reading = max(read, key=lambda name: INSTRUMENTS[name].relative, default="strain")
     load = "" if INSTRUMENTS[reading].relative else INSTRUMENTS[reading].controlled.name
-    if load in columns and _steps(numbers(columns[reading])) < _steps(numbers(columns[load])):
+    if load in columns and _steps(numbers[columns[reading]]) < _steps(numbers[columns[load]]):
         reading, load = load, reading
     partner = next((name for name in PARTNERS if name in columns), "")
-    chosen = {"reading": reading, "column": reading, "partner": partner, "load": load}
-    of_columns = {**chosen, "upward": reading, "partner_column": partner}
-    of_columns |= {"time": "time", "frequency": "frequency"}
-    likely_names = {key: columns.get(quantity, "") for key, quantity in of_columns.items()}
-    across = likely_names["frequency"] or likely_names["time"]
-    kind = INSTRUMENTS[reading].kind
-    return {**likely_names, "across": across, "kind": kind, "reading": reading, "partner": partner}
+    chosen = {name: name for name in ("time", "frequency")}
+    chosen |= {"column": reading, "load": load, "partner_column": partner}
+    named = {key: columns.get(quantity, "") for key, quantity in chosen.items()}
+    named |= {"across": named["frequency"] or named["time"], "upward": named["column"]}
+    return {**named, "kind": INSTRUMENTS[reading].kind, "reading": reading, "partner": partner}
 
 
 def _steps(values: Array) -> int:

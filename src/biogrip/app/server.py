@@ -8,7 +8,6 @@ import secrets
 import signal
 import sys
 import webbrowser
-from hmac import compare_digest
 from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -20,8 +19,8 @@ from flask.typing import ResponseReturnValue
 from biogrip.app.choices import CHOICES, KNOWN, TICKED, remedies_in, with_option
 from biogrip.app.window import LONGEST_S, MOST_FILES, Window
 from biogrip.page.templates import environment
-from biogrip.physics.instruments import INSTRUMENTS, KINDS, PARTNERS, of_kind
-from biogrip.physics.models import ALIASES, CANDIDATES
+from biogrip.physics.instruments import KINDS, of_kind
+from biogrip.physics.models import CANDIDATES
 from biogrip.physics.shapes import KNOWN_SHAPES
 from biogrip.traces.columns import TIME_UNITS
 from biogrip.traces.reader import form_in_words
@@ -35,17 +34,13 @@ _POLICY = (
     "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src 'self' "
     "data:; connect-src 'self'; frame-src 'self'; frame-ancestors 'self'; base-uri 'none'"
 )
-_HEADERS = {
-    "Content-Security-Policy": _POLICY,
-    "Referrer-Policy": "same-origin",
-    "X-Content-Type-Options": "nosniff",
-    "Cache-Control": "no-store",
-}
+_HEADERS = {"Referrer-Policy": "same-origin", "X-Content-Type-Options": "nosniff"}
+_HEADERS |= {"Content-Security-Policy": _POLICY, "Cache-Control": "no-store"}
 _SHOWN = {
-    **{"known": KNOWN, "kinds": KINDS, "of_kind": of_kind, "partners": PARTNERS},
-    **{"candidates": CANDIDATES, "aliases": ALIASES, "shapes": KNOWN_SHAPES, "units": TIME_UNITS},
-    **{"remedies_in": remedies_in, "form_in_words": form_in_words, "instruments": INSTRUMENTS},
-    **{"limits": (LARGEST_MB, MOST_FILES, LONGEST_S // 60), "outputs": _OUTPUTS},
+    **{"known": KNOWN, "kinds": KINDS, "of_kind": of_kind},
+    **{"candidates": CANDIDATES, "shapes": KNOWN_SHAPES, "units": TIME_UNITS, "outputs": _OUTPUTS},
+    **{"remedies_in": remedies_in, "form_in_words": form_in_words},
+    **{"limits": (LARGEST_MB, MOST_FILES, LONGEST_S // 60)},
 }
 
 
@@ -70,6 +65,7 @@ def open_app(port: int = 0, *, no_browser: bool = False) -> None:
 def app_of(folder: Path, token: str, windows: dict[str, Window]) -> Flask:
     """Return the application: its windows, each in folders of its own."""
     app = Flask(__name__, static_folder=None)
+    app.register_error_handler(KeyError, lambda _: ("There is no such window.", 404))
     app.config["MAX_CONTENT_LENGTH"] = LARGEST_MB * 1_000_000
     template = environment(_HERE).get_template("window.html.j2")
 
@@ -79,7 +75,7 @@ def app_of(folder: Path, token: str, windows: dict[str, Window]) -> Flask:
         hosts = [f"{name}:{request.environ['SERVER_PORT']}" for name in ("127.0.0.1", "localhost")]
         own = f"http://{request.host}"
         asks = request.headers.get("Origin", own if request.method == "GET" else "")
-        known = compare_digest(request.path.split("/")[1].encode(), token.encode())
+        known = secrets.compare_digest(request.path.split("/")[1].encode(), token.encode())
         if not known or request.host not in hosts or asks != own:
             abort(403)
 
@@ -101,7 +97,7 @@ def app_of(folder: Path, token: str, windows: dict[str, Window]) -> Flask:
     @app.get("/<_>/<name>/")
     def show(_: str, name: str) -> ResponseReturnValue:
         """Show a window as it is: it stays when it is loaded anew."""
-        return template.render(window=windows[name], **_SHOWN) if name in windows else abort(404)
+        return template.render(window=windows[name], **_SHOWN)
 
     @app.get("/<_>/<name>/out/<file>")
     def download(_: str, name: str, file: str) -> ResponseReturnValue:

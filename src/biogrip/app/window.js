@@ -80,8 +80,8 @@ function draw() {
   if (!svg) return;
   const points = JSON.parse(document.querySelector("#picture script").textContent);
   const [across, upward] = ["across", "upward"].map((name) => document.getElementById(name).value);
-  const pairs = (points[across] ?? []).map((x, i) => [x, points[upward]?.[i]])
-    .filter((pair) => pair.every((value) => typeof value === "number"));
+  const pairs = (points[across] ?? []).map((x, i) => [+x, +points[upward]?.[i]])
+    .filter((pair) => pair.every(isFinite));
   svg.replaceChildren();
   const add = (name, attributes, text = "") => {
     const made = document.createElementNS("http://www.w3.org/2000/svg", name);

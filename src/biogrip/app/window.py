@@ -7,18 +7,14 @@ import subprocess
 import sys
 import time
 from base64 import b64decode
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path
 from shlex import join
 from threading import Lock, Timer
-from typing import IO
-
-import numpy as np
+from typing import IO, Any
 
 from biogrip.app.choices import CHOICES, likely_choices, options_typed
-from biogrip.arrays import Array
 from biogrip.cli import options_of
 from biogrip.command.files import traces_of
 from biogrip.command.settings import Asked, check_settings, read_trace
@@ -27,51 +23,16 @@ from biogrip.command.words import limits_in_short
 from biogrip.errors import BiogripError
 from biogrip.terminal import visible
 from biogrip.traces.reader import Recording
-from biogrip.traces.tables import Sheet, Table, find_marks, is_clock, overview, seconds_or_inf
+from biogrip.traces.tables import Sheet, Table, numbers_in, overview
 
 MOST_FILES, LONGEST_S = 500, 1800
 """Files of a window at most, and the time after which its command is stopped."""
 
 _UNSAFE = re.compile(r"[^\w .,=()+-]|^[ .-]+")
-_CONFIGS = ".yaml", ".yml"
-_LONGEST_NAME, _ROWS_SHOWN, _MOST_POINTS = 100, 6, 1000
+_LONGEST_NAME, _MOST_POINTS = 100, 1000
 # So many traces of a table are checked before all run.
 _CHECKED = 3
 _PICTURE = re.compile(rb'<img class="(?:fit-picture|all)" src="data:image/png;base64,([^"]+)"')
-
-
-@dataclass(frozen=True)
-class Preview:
-    """A file as it was read, before anybody says which columns are to be used."""
-
-    sheet: Sheet
-    tables: list[Table]
-    table: Table
-    """The one that is shown."""
-
-    @property
-    def rows(self) -> list[list[str]]:
-        """Its first rows."""
-        rows = slice(self.table.first, min(self.table.first + _ROWS_SHOWN, self.table.end))
-        return [[*map(str, row)] for row in self.sheet.cells[rows, : len(self.table.names)]]
-
-    @cached_property
-    def points(self) -> dict[str, list[float | None]]:
-        """Numbers of every column, of some rows; None for none."""
-        every = -(-(self.table.end - self.table.first) // _MOST_POINTS) or 1
-        names = filter(None, self.table.names)
-        columns = {name: self.numbers(name)[::every].tolist() for name in names}
-        return {
-            name: [value if np.isfinite(value) else None for value in values]
-            for name, values in columns.items()
-        }
-
-    def numbers(self, name: str) -> Array:
-        """Return the numbers of a column, (n_rows,), times of day in s; NaN or inf for others."""
-        rows = slice(self.table.first, self.table.end)
-        cells = [*map(str, self.sheet.cells[rows, self.table.names.index(name)])]
-        marks = find_marks(cells, self.sheet.separator)
-        return np.array([*map(seconds_or_inf if is_clock(cells) else marks.number, cells)], float)
 
 
 @dataclass
@@ -81,10 +42,17 @@ class Window:
     folder: Path
     """Folder of the files; what the command writes is in others beside it."""
     names: list[str] = field(default_factory=list)
+    config: str = ""
+    """Name of a dropped config."""
     chosen: dict[str, str] = field(default_factory=lambda: dict.fromkeys(CHOICES, ""))
     lock: Lock = field(default_factory=Lock)
-    preview: Preview | None = None
-    """How the first trace looks."""
+    sheet: Sheet | None = None
+    """Cells of the first trace, or of the first that a table lists."""
+    tables: list[Table] = field(default_factory=list)
+    table: Table | None = None
+    """That of the tables in it that is shown."""
+    points: dict[str, list[str]] = field(default_factory=dict)
+    """Numbers of its columns, of some rows."""
     command: str = ""
     """What gives the same in a terminal."""
     problem: str = ""
@@ -102,38 +70,42 @@ class Window:
     def add(self, name: str, content: IO[bytes]) -> None:
         """Keep a file under a name of letters, digits and few marks, in no other folder."""
         plain = _UNSAFE.sub("_", re.split(r"[/\\]", name)[-1])[-_LONGEST_NAME:] or "_"
-        self.names = [*dict.fromkeys([*self.names, plain])][:MOST_FILES]
-        if plain in self.names:
-            (self.folder / plain).write_bytes(content.read())
+        if plain.endswith((".yaml", ".yml")):
+            self.config = plain
+        elif len({*self.names, plain}) > MOST_FILES:
+            return
+        else:
+            self.names = [*dict.fromkeys([*self.names, plain])]
+        (self.folder / plain).write_bytes(content.read())
 
     @property
     def inputs(self) -> list[str]:
-        """Files to identify: tables of traces, or else all that are no configs."""
-        names = [name for name in self.names if not name.endswith(_CONFIGS)]
-        return [name for name in names if is_table(Asked(self.folder / name))] or names
+        """Files to identify: tables of traces, or else all."""
+        return [name for name in self.names if is_table(Asked(self.folder / name))] or self.names
 
     @property
     def typed(self) -> list[str]:
         """The command as it is typed, but for what it writes."""
-        configs = [name for name in self.names if name.endswith(_CONFIGS)]
-        config = ["--config", configs[-1]] if configs else []
+        config = ["--config", self.config] if self.config else []
         return ["identify", *self.inputs, *options_typed(self.chosen), *config]
 
     def look(self) -> None:
         """Read the first trace; if nothing is chosen yet, choose what names of columns tell."""
-        self.preview = None
-        names = [name for name in self.names if not name.endswith(_CONFIGS)]
-        first = next((name for name in names if name not in self.inputs), names[0])
-        sheet, tables = overview(self.folder / first)
-        block, longest = self.chosen["block"], max(tables, key=lambda it: it.end - it.first)
-        shown = dict(enumerate(tables, 1)).get(int(block) if block.isdecimal() else 0, longest)
-        self.preview = Preview(sheet, tables, shown)
+        first = next((name for name in self.names if name not in self.inputs), self.names[0])
+        self.sheet, self.tables = overview(self.folder / first)
+        block, longest = self.chosen["block"], max(self.tables, key=lambda it: it.end - it.first)
+        by_number = {str(number): table for number, table in enumerate(self.tables, 1)}
+        self.table = by_number.get(block, longest)
+        numbers = numbers_in(self.sheet, self.table)
+        every = (self.table.end - self.table.first) // _MOST_POINTS + 1
+        self.points = {name: [f"{it:.8g}" for it in own[::every]] for name, own in numbers.items()}
         if not self.chosen["column"]:
-            self.chosen |= likely_choices([*filter(None, shown.names)], self.preview.numbers)
+            self.chosen |= likely_choices(numbers)
 
     def check(self) -> None:
         """Find out what the command would do with what is chosen."""
-        self.command, self.problem, self.traces, self.recording = "", "", [], None
+        self.command, self.problem, self.table, self.traces = "", "", None, []
+        self.recording = None
         try:
             self.look()
             written = ["--report", "page.html", "--csv", "table.csv"]
@@ -149,8 +121,8 @@ class Window:
         given = options_of(self.typed)
         config = given.pop("config", None)
         others = {*given} - {"files", "settings", "command"}
-        if others or (config and str(config) not in self.names):
-            text = "not here; results can be downloaded, and a config is dropped."
+        if others or str(config or "") != self.config:
+            text = "not here: results can be downloaded, and a config is dropped."
             raise BiogripError(f"--{min(others, default='config')}: {text}")
         files = [self.folder / name for name in self.inputs]
         traces = traces_of(files, config and self.folder / config, given["settings"])
@@ -165,14 +137,10 @@ class Window:
         return str(message).replace(f"{self.folder}/", "").replace(f" in {self.folder}", "")
 
     @property
-    def runs(self) -> bool:
-        """True until the command has ended."""
-        return self.work is not None and self.work.poll() is None
-
-    @property
-    def seconds(self) -> int:
-        """How long it runs."""
-        return int(time.time() - self.started)
+    def running_s(self) -> int:
+        """How long the command runs, at least 1; 0 if it does not."""
+        runs = self.work is not None and self.work.poll() is None
+        return int(time.time() - self.started) + 1 if runs else 0
 
     @property
     def of_table(self) -> bool:
@@ -201,7 +169,7 @@ class Window:
 
     def stop(self) -> None:
         """Stop the command as its user would in a terminal, and wait for its end."""
-        if self.work is not None and self.runs:
+        if self.work and self.running_s:
             self.work.send_signal(signal.SIGINT)
             self.work.wait()
 
@@ -218,16 +186,14 @@ class Window:
         ended = subprocess.run(command, cwd=self.out, capture_output=True, text=True, timeout=60)
         self.compared = f"{join(['biogrip', *typed])}\n\n{ended.stderr}{ended.stdout}"
 
-    def done(self) -> list[tuple[str, Mapping[str, str]]]:
-        """Return what is known of each of several traces: nothing while it waits."""
-        rows: list[tuple[str, Mapping[str, str]]] = []
+    def done(self) -> Iterator[tuple[str, str, Mapping[str, str]]]:
+        """Yield name, status and quantities of several traces; nothing of those that wait."""
         for own in self.traces:
-            data = {"fit": "", "quantities": []}
+            data: dict[str, Any] = {"fit": "", "quantities": []}
             if own.output.exists() and own.output.stat().st_mtime > self.started:
                 data = json.loads(own.output.read_text("utf-8"))
             told = {it["quantity"]: limits_in_short(it) for it in data["quantities"]}
-            rows.append((self.shown(own.name), {"fit": data["fit"], **told}))
-        return rows
+            yield self.shown(own.name), data["fit"], told
 
     def output(self, name: str) -> bytes:
         """Return a file of the results, or the picture of the fit; nothing if there is none."""

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from biogrip.arrays import IntArray
+from biogrip.arrays import Array, IntArray
 from biogrip.digits import counted
 from biogrip.errors import BiogripError
 from biogrip.traces.columns import (
@@ -165,6 +165,16 @@ def overview(path: Path) -> tuple[Sheet, list[Table]]:
             names = ["1", "2"]
         columns = replace(columns, time=names[0], strain=names[1])
     return sheet, tables
+
+
+def numbers_in(sheet: Sheet, table: Table) -> dict[str, Array]:
+    """Return the numbers of each column, (n_rows,), times of day in s; NaN or inf for others."""
+    numbers: dict[str, Array] = {}
+    for index in (index for index, name in enumerate(table.names) if name):
+        cells = [*map(str, sheet.cells[table.first : table.end, index])]
+        number = seconds_or_inf if is_clock(cells) else find_marks(cells, sheet.separator).number
+        numbers.setdefault(table.names[index], np.array([*map(number, cells)], dtype=float))
+    return numbers
 
 
 def _cells(
