@@ -11,7 +11,7 @@ import yaml
 from biogrip.arrays import Array
 from biogrip.command.options import GROUPS
 from biogrip.errors import BiogripError
-from biogrip.physics.instruments import INSTRUMENTS, PARTNERS
+from biogrip.physics.instruments import INSTRUMENTS, PARTNERS, ROTATION
 from biogrip.traces.columns import plain_name
 
 KNOWN = yaml.safe_load(Path(__file__).with_name("known.yaml").read_text("utf-8"))
@@ -22,7 +22,7 @@ _TYPED = (
     *("time", "frequency", "block", "rows", "hold", "load", "ramp", "shape", "contact", "start"),
     *("from", "until", "model"),
 )
-_OF_COLUMNS = "kind", "reading", "column", "partner", "partner_column"
+_OF_COLUMNS = "reading", "column", "partner", "partner_column"
 CHOICES = (*_OF_COLUMNS, *_TYPED, *TICKED, "more", "across", "upward", "by", "unit")
 """All that can be chosen, as text: options by their names, more options, columns of pictures."""
 
@@ -45,6 +45,7 @@ def likely_choices(numbers: Mapping[str, Array]) -> dict[str, str]:
         words = plain_name(name).replace("_", " ")
         likely = (own for own, pattern in KNOWN["words"].items() if re.search(pattern, words))
         columns.setdefault(next(likely, ""), name)
+    columns[""] = ""
     swept = [name for name in columns if name in INSTRUMENTS and INSTRUMENTS[name].sweeps]
     read = swept if "frequency" in columns else [own for own in INSTRUMENTS if own in columns]
     reading = max(read, key=lambda name: INSTRUMENTS[name].relative, default="strain")
@@ -56,7 +57,7 @@ def likely_choices(numbers: Mapping[str, Array]) -> dict[str, str]:
     chosen |= {"column": reading, "load": load, "partner_column": partner}
     named = {key: columns.get(quantity, "") for key, quantity in chosen.items()}
     named |= {"across": named["frequency"] or named["time"], "upward": named["column"]}
-    return {**named, "kind": INSTRUMENTS[reading].kind, "reading": reading, "partner": partner}
+    return {**named, "reading": reading, "partner": partner}
 
 
 def _steps(values: Array) -> int:
@@ -67,8 +68,9 @@ def _steps(values: Array) -> int:
 
 def options_typed(chosen: Mapping[str, str]) -> list[str]:
     """Return what is chosen as it is typed; a `BiogripError` has a quote without an end."""
-    hidden = _OF_TIME if chosen["kind"] == "oscillation" else _OF_SWEEPS
-    pairs = [("--reading", chosen["reading"], chosen["column"])] * bool(chosen["column"])
+    reading = chosen["reading"] or ROTATION.name
+    hidden = _OF_TIME if INSTRUMENTS[reading].sweeps else _OF_SWEEPS
+    pairs = [("--reading", reading, chosen["column"])] * bool(chosen["column"])
     if hidden is _OF_TIME and chosen["partner_column"]:
         pairs.append(("--reading", chosen["partner"], chosen["partner_column"]))
     typed = [word for option, *of in pairs for word in (option, "=".join(of))]
@@ -87,7 +89,7 @@ def with_option(option: str, value: str, more: str) -> dict[str, str]:
     if option == "--reading" and quantity in PARTNERS:
         return {"partner": quantity, "partner_column": column}
     if option == "--reading" and quantity in INSTRUMENTS:
-        return {"kind": INSTRUMENTS[quantity].kind, "reading": quantity, "column": column}
+        return {"reading": quantity, "column": column}
     if (name := option.removeprefix("--")) in CHOICES:
         return {name: value or "on"}
     return {"more": f"{more} {shlex.join(filter(None, (option, value)))}".strip()}

@@ -8,25 +8,24 @@ import secrets
 import signal
 import sys
 import webbrowser
+from collections import defaultdict
+from collections.abc import Mapping
 from io import BytesIO
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import TemporaryDirectory, mkdtemp
 
 import waitress
 from flask import Flask, Response, abort, redirect, request, send_file
 from flask.typing import ResponseReturnValue
 
 from biogrip.app.choices import CHOICES, KNOWN, TICKED, remedies_in, with_option
-from biogrip.app.window import LONGEST_S, MOST_FILES, Window
+from biogrip.app.window import LARGEST_MB, LONGEST_S, MOST_FILES, Window
 from biogrip.page.templates import environment
-from biogrip.physics.instruments import KINDS, of_kind
+from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.models import CANDIDATES
 from biogrip.physics.shapes import KNOWN_SHAPES
 from biogrip.traces.columns import TIME_UNITS
 from biogrip.traces.reader import form_in_words
-
-LARGEST_MB = 200
-"""Of all files that are dropped at once."""
 
 _HERE = Path(__file__).parent
 _OUTPUTS = "page.html", "figure.png", "table.csv", "result.json", "groups.csv", "groups.png"
@@ -37,7 +36,7 @@ _POLICY = (
 _HEADERS = {"Referrer-Policy": "same-origin", "X-Content-Type-Options": "nosniff"}
 _HEADERS |= {"Content-Security-Policy": _POLICY, "Cache-Control": "no-store"}
 _SHOWN = {
-    **{"known": KNOWN, "kinds": KINDS, "of_kind": of_kind},
+    **{"known": KNOWN, "instruments": INSTRUMENTS},
     **{"candidates": CANDIDATES, "shapes": KNOWN_SHAPES, "units": TIME_UNITS, "outputs": _OUTPUTS},
     **{"remedies_in": remedies_in, "form_in_words": form_in_words},
     **{"limits": (LARGEST_MB, MOST_FILES, LONGEST_S // 60)},
@@ -50,8 +49,10 @@ def open_app(port: int = 0, *, no_browser: bool = False) -> None:
         # So that what is temporary goes, too.
         signal.signal(number, lambda *_: sys.exit())
     with TemporaryDirectory(prefix="biogrip_") as folder:
-        windows: dict[str, Window] = {}
-        app = app_of(Path(folder).resolve(), token := secrets.token_urlsafe(24), windows)
+        windows: dict[str, Window] = defaultdict(
+            lambda: Window(Path(mkdtemp(dir=folder)).resolve())
+        )
+        app = app_of(windows, token := secrets.token_urlsafe(24))
         server = waitress.create_server(app, host="127.0.0.1", port=port)
         address = f"http://127.0.0.1:{server.effective_port}/{token}/"
         print(f"{address}\nOpen this address in a browser here; Ctrl-C ends it.", flush=True)
@@ -62,10 +63,9 @@ def open_app(port: int = 0, *, no_browser: bool = False) -> None:
             window.stop()
 
 
-def app_of(folder: Path, token: str, windows: dict[str, Window]) -> Flask:
-    """Return the application: its windows, each in folders of its own."""
+def app_of(windows: Mapping[str, Window], token: str) -> Flask:
+    """Return the application: windows by name, which share nothing."""
     app = Flask(__name__, static_folder=None)
-    app.register_error_handler(KeyError, lambda _: ("There is no such window.", 404))
     app.config["MAX_CONTENT_LENGTH"] = LARGEST_MB * 1_000_000
     template = environment(_HERE).get_template("window.html.j2")
 
@@ -89,10 +89,7 @@ def app_of(folder: Path, token: str, windows: dict[str, Window]) -> Flask:
     @app.get("/<_>/")
     def open_window(_: str) -> ResponseReturnValue:
         """Begin a window."""
-        name = secrets.token_urlsafe(8)
-        (folder / name).mkdir()
-        windows[name] = Window(folder / name)
-        return redirect(f"{name}/")
+        return redirect(f"{secrets.token_urlsafe(8)}/")
 
     @app.get("/<_>/<name>/")
     def show(_: str, name: str) -> ResponseReturnValue:
@@ -124,9 +121,6 @@ def _do(action: str, window: Window) -> None:
     given, do = request.form, request.form.get("do", "")
     window.chosen |= {key: given[key] for key in CHOICES if key in given}
     window.chosen |= {key: given.get(key, "") for key in TICKED}
-    names = [instrument.read.name for instrument in of_kind(given.get("kind", ""))]
-    if names and window.chosen["reading"] not in names:
-        window.chosen["reading"] = names[0]
     if action == "files":
         for file in request.files.getlist("files"):
             window.add(file.filename or "", file.stream)

@@ -25,13 +25,12 @@ from biogrip.terminal import visible
 from biogrip.traces.reader import Recording
 from biogrip.traces.tables import Sheet, Table, numbers_in, overview
 
-MOST_FILES, LONGEST_S = 500, 1800
-"""Files of a window at most, and the time after which its command is stopped."""
+MOST_FILES, LARGEST_MB, LONGEST_S = 500, 200, 1800
+"""Most files of a window, and sizes of those dropped at once; when its command is stopped."""
 
 _UNSAFE = re.compile(r"[^\w .,=()+-]|^[ .-]+")
-_LONGEST_NAME, _MOST_POINTS = 100, 1000
-# So many traces of a table are checked before all run.
-_CHECKED = 3
+# Of a table so many traces are checked before all run.
+_LONGEST_NAME, _MOST_POINTS, _CHECKED = 100, 1000, 3
 _PICTURE = re.compile(rb'<img class="(?:fit-picture|all)" src="data:image/png;base64,([^"]+)"')
 
 
@@ -86,8 +85,8 @@ class Window:
     @property
     def typed(self) -> list[str]:
         """The command as it is typed, but for what it writes."""
-        config = ["--config", self.config] if self.config else []
-        return ["identify", *self.inputs, *options_typed(self.chosen), *config]
+        typed = ["identify", *self.inputs, *options_typed(self.chosen)]
+        return [*typed, "--config", self.config] if self.config else typed
 
     def look(self) -> None:
         """Read the first trace; if nothing is chosen yet, choose what names of columns tell."""
@@ -119,13 +118,13 @@ class Window:
     def _traces(self) -> list[Asked]:
         """Return what is asked; a `BiogripError` says what the window does not do."""
         given = options_of(self.typed)
-        config = given.pop("config", None)
-        others = {*given} - {"files", "settings", "command"}
-        if others or str(config or "") != self.config:
+        allowed = {"command", "files", "settings", *(["config"] if self.config else [])}
+        if others := {*given} - allowed:
             text = "not here: results can be downloaded, and a config is dropped."
-            raise BiogripError(f"--{min(others, default='config')}: {text}")
+            raise BiogripError(f"--{min(others)}: {text}")
         files = [self.folder / name for name in self.inputs]
-        traces = traces_of(files, config and self.folder / config, given["settings"])
+        config = self.folder / self.config if self.config else None
+        traces = traces_of(files, config, given["settings"])
         for own in traces:
             if own.trace.resolve().parent != self.folder:
                 found = f"found '{visible(own.trace)}', allowed are names of dropped files"
@@ -175,8 +174,7 @@ class Window:
 
     def said(self, stream: str) -> str:
         """Return what the command has printed, but for the files that it has written."""
-        said = (self.out / stream).read_text("utf-8")
-        return self.shown(re.sub(r"(?m)^Written to .*$", "", said).strip())
+        return self.shown((self.out / stream).read_text("utf-8").partition("\nWritten to ")[0])
 
     def compare(self) -> None:
         """Compare groups of the traces, by columns of their table."""
