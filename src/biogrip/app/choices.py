@@ -45,16 +45,20 @@ def likely_choices(numbers: Mapping[str, Array]) -> dict[str, str]:
         words = plain_name(name).replace("_", " ")
         likely = (own for own, pattern in KNOWN["words"].items() if re.search(pattern, words))
         columns.setdefault(next(likely, ""), name)
-    columns[""] = ""
     swept = [name for name in columns if name in INSTRUMENTS and INSTRUMENTS[name].sweeps]
     read = swept if "frequency" in columns else [own for own in INSTRUMENTS if own in columns]
     reading = max(read, key=lambda name: INSTRUMENTS[name].relative, default="strain")
     load = "" if INSTRUMENTS[reading].relative else INSTRUMENTS[reading].controlled.name
-    if load in columns and _steps(numbers[columns[reading]]) < _steps(numbers[columns[load]]):
+    if (
+        load
+        and load in columns
+        and _steps(numbers[columns[reading]]) < _steps(numbers[columns[load]])
+    ):
         reading, load = load, reading
     partner = next((name for name in PARTNERS if name in columns), "")
     chosen = {name: name for name in ("time", "frequency")}
     chosen |= {"column": reading, "load": load, "partner_column": partner}
+    columns[""] = ""
     named = {key: columns.get(quantity, "") for key, quantity in chosen.items()}
     named |= {"across": named["frequency"] or named["time"], "upward": named["column"]}
     return {**named, "reading": reading, "partner": partner}
