@@ -12,18 +12,17 @@ from biogrip.arrays import Array
 from biogrip.command.options import GROUPS
 from biogrip.errors import BiogripError
 from biogrip.physics.instruments import INSTRUMENTS, PARTNERS, ROTATION
-from biogrip.traces.columns import plain_name
+from biogrip.traces.columns import AXES, plain_name
 
 KNOWN = yaml.safe_load(Path(__file__).with_name("known.yaml").read_text("utf-8"))
 """Words of columns, examples and drawings."""
 
 TICKED = "offset", "contact", "no-compare"
-_TYPED = (
-    *("time", "frequency", "block", "rows", "hold", "load", "ramp", "shape", "contact", "start"),
-    *("from", "until", "model"),
+CHOICES = (
+    *("reading", "column", "partner", "partner_column", "across", "upward", "more", "by", "unit"),
+    *("time", "frequency", "block", "rows", "hold", "load", "ramp", "shape", "start", "from"),
+    *("until", "model", *TICKED),
 )
-_OF_COLUMNS = "reading", "column", "partner", "partner_column"
-CHOICES = (*_OF_COLUMNS, *_TYPED, *TICKED, "more", "across", "upward", "by", "unit")
 """All that can be chosen, as text: options by their names, more options, columns of pictures."""
 
 # What a sweep does not have, and what only that has.
@@ -44,21 +43,16 @@ def likely_choices(numbers: Mapping[str, Array]) -> dict[str, str]:
     for name in numbers:
         words = plain_name(name).replace("_", " ")
         likely = (own for own, pattern in KNOWN["words"].items() if re.search(pattern, words))
-        columns.setdefault(next(likely, ""), name)
+        columns.setdefault(next(likely, "other"), name)
     swept = [name for name in columns if name in INSTRUMENTS and INSTRUMENTS[name].sweeps]
     read = swept if "frequency" in columns else [own for own in INSTRUMENTS if own in columns]
     reading = max(read, key=lambda name: INSTRUMENTS[name].relative, default="strain")
     load = "" if INSTRUMENTS[reading].relative else INSTRUMENTS[reading].controlled.name
-    if (
-        load
-        and load in columns
-        and _steps(numbers[columns[reading]]) < _steps(numbers[columns[load]])
-    ):
-        reading, load = load, reading
+    if {load, reading} <= {*columns}:
+        load, reading = sorted((load, reading), key=lambda name: _steps(numbers[columns[name]]))
     partner = next((name for name in PARTNERS if name in columns), "")
-    chosen = {name: name for name in ("time", "frequency")}
-    chosen |= {"column": reading, "load": load, "partner_column": partner}
-    columns[""] = ""
+    chosen = {"column": reading, "load": load, "partner_column": partner}
+    chosen |= {axis: axis for axis in AXES}
     named = {key: columns.get(quantity, "") for key, quantity in chosen.items()}
     named |= {"across": named["frequency"] or named["time"], "upward": named["column"]}
     return {**named, "reading": reading, "partner": partner}
@@ -74,13 +68,12 @@ def options_typed(chosen: Mapping[str, str]) -> list[str]:
     """Return what is chosen as it is typed; a `BiogripError` has a quote without an end."""
     reading = chosen["reading"] or ROTATION.name
     hidden = _OF_TIME if INSTRUMENTS[reading].sweeps else _OF_SWEEPS
-    pairs = [("--reading", reading, chosen["column"])] * bool(chosen["column"])
+    typed = ["--reading", f"{reading}={chosen['column']}"] if chosen["column"] else []
     if hidden is _OF_TIME and chosen["partner_column"]:
-        pairs.append(("--reading", chosen["partner"], chosen["partner_column"]))
-    typed = [word for option, *of in pairs for word in (option, "=".join(of))]
-    for name in CHOICES[len(_OF_COLUMNS) :]:
-        if chosen[name] and f"--{name}" in _TAKES_VALUE and name not in hidden:
-            typed += [f"--{name}", chosen[name]][: 1 + _TAKES_VALUE[f"--{name}"]]
+        typed += ["--reading", f"{chosen['partner']}={chosen['partner_column']}"]
+    for name in CHOICES[1:]:
+        if chosen[name] and name not in hidden and (option := f"--{name}") in _TAKES_VALUE:
+            typed += [option, chosen[name]] if _TAKES_VALUE[option] else [option]
     try:
         return [*typed, *shlex.split(chosen["more"])]
     except ValueError as error:
@@ -90,8 +83,6 @@ def options_typed(chosen: Mapping[str, str]) -> list[str]:
 def with_option(option: str, value: str, more: str) -> dict[str, str]:
     """Return what to choose for an option: its field, or else more options."""
     quantity, _, column = value.partition("=")
-    if option == "--reading" and quantity in PARTNERS:
-        return {"partner": quantity, "partner_column": column}
     if option == "--reading" and quantity in INSTRUMENTS:
         return {"reading": quantity, "column": column}
     if (name := option.removeprefix("--")) in CHOICES:

@@ -14,18 +14,23 @@ from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory, mkdtemp
 
-import waitress
-from flask import Flask, Response, abort, redirect, request, send_file
-from flask.typing import ResponseReturnValue
-
 from biogrip.app.choices import CHOICES, KNOWN, TICKED, remedies_in, with_option
-from biogrip.app.window import LARGEST_MB, LONGEST_S, MOST_FILES, Window
+from biogrip.app.window import LARGEST_MB, LONGEST_S, Window
+from biogrip.errors import BiogripError
 from biogrip.page.templates import environment
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.models import CANDIDATES
 from biogrip.physics.shapes import KNOWN_SHAPES
 from biogrip.traces.columns import TIME_UNITS
 from biogrip.traces.reader import form_in_words
+
+try:
+    import waitress
+    from flask import Flask, Response, abort, redirect, request, send_file
+    from flask.typing import ResponseReturnValue
+except ModuleNotFoundError as error:
+    text = f"app: found no {error.name}; python -m pip install '.[app]' brings it."
+    raise BiogripError(text) from error
 
 _HERE = Path(__file__).parent
 _OUTPUTS = "page.html", "figure.png", "table.csv", "result.json", "groups.csv", "groups.png"
@@ -39,7 +44,7 @@ _SHOWN = {
     **{"known": KNOWN, "instruments": INSTRUMENTS},
     **{"candidates": CANDIDATES, "shapes": KNOWN_SHAPES, "units": TIME_UNITS, "outputs": _OUTPUTS},
     **{"remedies_in": remedies_in, "form_in_words": form_in_words},
-    **{"limits": (LARGEST_MB, MOST_FILES, LONGEST_S // 60)},
+    **{"limits": (LARGEST_MB, LONGEST_S // 60)},
 }
 
 
@@ -49,9 +54,7 @@ def open_app(port: int = 0, *, no_browser: bool = False) -> None:
         # So that what is temporary goes, too.
         signal.signal(number, lambda *_: sys.exit())
     with TemporaryDirectory(prefix="biogrip_") as folder:
-        windows: dict[str, Window] = defaultdict(
-            lambda: Window(Path(mkdtemp(dir=folder)).resolve())
-        )
+        windows = defaultdict[str, Window](lambda: Window(Path(mkdtemp(dir=folder))))
         app = app_of(windows, token := secrets.token_urlsafe(24))
         server = waitress.create_server(app, host="127.0.0.1", port=port)
         address = f"http://127.0.0.1:{server.effective_port}/{token}/"

@@ -25,8 +25,8 @@ from biogrip.terminal import visible
 from biogrip.traces.reader import Recording
 from biogrip.traces.tables import Sheet, Table, numbers_in, overview
 
-MOST_FILES, LARGEST_MB, LONGEST_S = 500, 200, 1800
-"""Most files of a window, and sizes of those dropped at once; when its command is stopped."""
+LARGEST_MB, LONGEST_S = 200, 1800
+"""Of files that are dropped at once, and of the time after which a command is stopped."""
 
 _UNSAFE = re.compile(r"[^\w .,=()+-]|^[ .-]+")
 # Of a table so many traces are checked before all run.
@@ -71,8 +71,6 @@ class Window:
         plain = _UNSAFE.sub("_", re.split(r"[/\\]", name)[-1])[-_LONGEST_NAME:] or "_"
         if plain.endswith((".yaml", ".yml")):
             self.config = plain
-        elif len({*self.names, plain}) > MOST_FILES:
-            return
         else:
             self.names = [*dict.fromkeys([*self.names, plain])]
         (self.folder / plain).write_bytes(content.read())
@@ -93,8 +91,7 @@ class Window:
         first = next((name for name in self.names if name not in self.inputs), self.names[0])
         self.sheet, self.tables = overview(self.folder / first)
         block, longest = self.chosen["block"], max(self.tables, key=lambda it: it.end - it.first)
-        by_number = {str(number): table for number, table in enumerate(self.tables, 1)}
-        self.table = by_number.get(block, longest)
+        self.table = {f"{n}": table for n, table in enumerate(self.tables, 1)}.get(block, longest)
         numbers = numbers_in(self.sheet, self.table)
         every = (self.table.end - self.table.first) // _MOST_POINTS + 1
         self.points = {name: [f"{it:.8g}" for it in own[::every]] for name, own in numbers.items()}
@@ -126,7 +123,7 @@ class Window:
         config = self.folder / self.config if self.config else None
         traces = traces_of(files, config, given["settings"])
         for own in traces:
-            if own.trace.resolve().parent != self.folder:
+            if own.trace.resolve().parent != self.folder.resolve():
                 found = f"found '{visible(own.trace)}', allowed are names of dropped files"
                 raise BiogripError(f"{own.place}: {found}.")
         return traces
@@ -145,11 +142,6 @@ class Window:
     def of_table(self) -> bool:
         """True of several traces, or of a table of them."""
         return len(self.traces) > 1 or any(own.place != Asked.place for own in self.traces)
-
-    @property
-    def copied(self) -> list[str]:
-        """Columns of a table of traces that set nothing: groups, dishes, ..."""
-        return [*dict.fromkeys(name for own in self.traces for name in own.copied if name)]
 
     def start(self) -> None:
         """Start the command in a process of its own, in place of what ran before."""
