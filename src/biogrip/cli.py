@@ -241,5 +241,4 @@ def _add_app(commands: Any) -> None:
     app = commands.add_parser("app", help=text, description=text)
     app.set_defaults(command="biogrip.app.server:open_app")
     app.add_argument("--port", type=int, metavar="PORT", help="of this machine [any that is free]")
-    text = "print the address, and do not open it"
-    app.add_argument("--no-browser", action="store_true", help=text)
+    app.add_argument("--no-browser", action="store_true", help="print the address only")

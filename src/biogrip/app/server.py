@@ -9,7 +9,6 @@ import signal
 import sys
 import webbrowser
 from collections import defaultdict
-from collections.abc import Mapping
 from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory, mkdtemp
@@ -29,22 +28,17 @@ try:
     from flask import Flask, Response, abort, redirect, request, send_file
     from flask.typing import ResponseReturnValue
 except ModuleNotFoundError as error:
-    text = f"app: found no {error.name}; python -m pip install '.[app]' brings it."
-    raise BiogripError(text) from error
+    raise BiogripError(f"app: needs {error.name}: python -m pip install '.[app]'") from error
 
 _HERE = Path(__file__).parent
 _OUTPUTS = "page.html", "figure.png", "table.csv", "result.json", "groups.csv", "groups.png"
-_POLICY = (
-    "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src 'self' "
-    "data:; connect-src 'self'; frame-src 'self'; frame-ancestors 'self'; base-uri 'none'"
-)
+_POLICY = "default-src 'self' 'unsafe-inline'; img-src 'self' data:; frame-ancestors 'self'"
 _HEADERS = {"Referrer-Policy": "same-origin", "X-Content-Type-Options": "nosniff"}
 _HEADERS |= {"Content-Security-Policy": _POLICY, "Cache-Control": "no-store"}
 _SHOWN = {
-    **{"known": KNOWN, "instruments": INSTRUMENTS},
+    **{"known": KNOWN, "instruments": INSTRUMENTS, "limits": (LARGEST_MB, LONGEST_S // 60)},
     **{"candidates": CANDIDATES, "shapes": KNOWN_SHAPES, "units": TIME_UNITS, "outputs": _OUTPUTS},
     **{"remedies_in": remedies_in, "form_in_words": form_in_words},
-    **{"limits": (LARGEST_MB, LONGEST_S // 60)},
 }
 
 
@@ -66,7 +60,7 @@ def open_app(port: int = 0, *, no_browser: bool = False) -> None:
             window.stop()
 
 
-def app_of(windows: Mapping[str, Window], token: str) -> Flask:
+def app_of(windows: dict[str, Window], token: str) -> Flask:
     """Return the application: windows by name, which share nothing."""
     app = Flask(__name__, static_folder=None)
     app.config["MAX_CONTENT_LENGTH"] = LARGEST_MB * 1_000_000
@@ -85,8 +79,7 @@ def app_of(windows: Mapping[str, Window], token: str) -> Flask:
     @app.after_request
     def limit_page(response: Response) -> Response:
         """Let no page load anything else, nor tell its address."""
-        for name, value in _HEADERS.items():
-            response.headers.setdefault(name, value)
+        response.headers.update({**_HEADERS, **response.headers})
         return response
 
     @app.get("/<_>/")
@@ -101,12 +94,11 @@ def app_of(windows: Mapping[str, Window], token: str) -> Flask:
 
     @app.get("/<_>/<name>/out/<file>")
     def download(_: str, name: str, file: str) -> ResponseReturnValue:
-        """Send a result; the page in a sandbox, without access to the window."""
+        """Send a result, which in a sandbox has no access to the window."""
         if file not in _OUTPUTS or not (content := windows[name].output(file)):
             abort(404)
         response = send_file(BytesIO(content), download_name=file)
-        if file == "page.html":
-            response.headers["Content-Security-Policy"] = f"sandbox allow-scripts; {_POLICY}"
+        response.headers["Content-Security-Policy"] = f"sandbox allow-scripts; {_POLICY}"
         return response
 
     @app.post("/<_>/<name>/<action>")
@@ -122,15 +114,13 @@ def app_of(windows: Mapping[str, Window], token: str) -> Flask:
 def _do(action: str, window: Window) -> None:
     """Take what is chosen, and do one thing more."""
     given, do = request.form, request.form.get("do", "")
-    window.chosen |= {key: given[key] for key in CHOICES if key in given}
-    window.chosen |= {key: given.get(key, "") for key in TICKED}
+    window.chosen |= {key: given.get(key, "") for key in CHOICES if key in (*given, *TICKED)}
     if action == "files":
         for file in request.files.getlist("files"):
             window.add(file.filename or "", file.stream)
     elif action == "example":
         name = KNOWN["examples"][do]["file"]
-        packaged = _HERE / "examples" / name
-        path = packaged if packaged.is_file() else _HERE.parents[2] / "data" / name
+        path = next(_HERE.glob(f"examples/{name}"), _HERE.parents[2] / "data" / name)
         window.names, window.chosen = [], {**dict.fromkeys(CHOICES, ""), **KNOWN["examples"][do]}
         window.add(name, BytesIO(path.read_bytes()))
     elif action == "option":
@@ -138,9 +128,5 @@ def _do(action: str, window: Window) -> None:
         window.chosen |= with_option(option, value, window.chosen["more"])
     if action != "show" and window.names:
         window.check()
-    if action == "start" and window.traces:
-        window.start()
-    elif action == "stop":
-        window.stop()
-    elif action == "compare":
-        window.compare()
+    if action in ("stop", "compare") or (action == "start" and window.traces):
+        getattr(window, action)()

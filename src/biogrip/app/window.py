@@ -21,7 +21,6 @@ from biogrip.command.settings import Asked, check_settings, read_trace
 from biogrip.command.sheet import is_table
 from biogrip.command.words import limits_in_short
 from biogrip.errors import BiogripError
-from biogrip.terminal import visible
 from biogrip.traces.reader import Recording
 from biogrip.traces.tables import Sheet, Table, numbers_in, overview
 
@@ -104,8 +103,8 @@ class Window:
         self.recording = None
         try:
             self.look()
-            written = ["--report", "page.html", "--csv", "table.csv"]
-            self.command = join(["biogrip", *self.typed, *written])
+            typed = join(["biogrip", *self.typed])
+            self.command = f"{typed} --report page.html --csv table.csv"
             self.traces = self._traces()
             check_settings(self.traces[:_CHECKED])
             self.recording, _ = read_trace(self.traces[0])
@@ -117,15 +116,13 @@ class Window:
         given = options_of(self.typed)
         allowed = {"command", "files", "settings", *(["config"] if self.config else [])}
         if others := {*given} - allowed:
-            text = "not here: results can be downloaded, and a config is dropped."
-            raise BiogripError(f"--{min(others)}: {text}")
+            raise BiogripError(f"--{min(others)}: not here; download results, drop a config.")
         files = [self.folder / name for name in self.inputs]
         config = self.folder / self.config if self.config else None
         traces = traces_of(files, config, given["settings"])
         for own in traces:
             if own.trace.resolve().parent != self.folder.resolve():
-                found = f"found '{visible(own.trace)}', allowed are names of dropped files"
-                raise BiogripError(f"{own.place}: {found}.")
+                raise BiogripError(f"{own.place}: found {own.trace}, allowed are dropped files.")
         return traces
 
     def shown(self, message: object) -> str:

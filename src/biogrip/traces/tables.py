@@ -160,10 +160,9 @@ def overview(path: Path) -> tuple[Sheet, list[Table]]:
         tables = _tables(sheet, columns) or [_likely_table(sheet)]
         longest = max(tables, key=lambda table: table.end - table.first)
         # With two of its columns, every table that has them is found; without names, by numbers.
-        names = [*dict.fromkeys(filter(None, longest.names)), "1", "2"][:2]
-        if all(map(_is_number, names)):
-            names = ["1", "2"]
-        columns = replace(columns, time=names[0], strain=names[1])
+        words = [name for name in dict.fromkeys(longest.names) if name and not _is_number(name)]
+        first, second, *_ = [*words, "1", "2"]
+        columns = replace(columns, time=first, strain=second)
     return sheet, tables
 
 
