@@ -12,7 +12,7 @@ function send(action, more = {}) {
 
 async function answered(action, more) {
   const body = new FormData(form);
-  const sent = [...body.entries()].join("\n");
+  const sent = new Map(body);
   for (const [name, value] of Object.entries(more))
     for (const each of [value].flat()) body.append(name, each);
   const answer = await fetch(action, { method: "POST", body }).catch(() => null);
@@ -36,9 +36,12 @@ function show(page, typed, sent) {
     if (shown[part.id] === part.outerHTML) continue;
     shown[part.id] = part.outerHTML;
     document.getElementById(part.id).replaceWith(part);
-    for (const input of part.querySelectorAll("input:not([type=radio], [type=checkbox], [type=file]), select"))
-      if (typed.has(input.name) && !sent.split("\n").includes(`${input.name},${typed.get(input.name)}`))
-        input.value = typed.get(input.name);
+    for (const input of part.querySelectorAll("[name]")) {
+      const value = typed.get(input.name);
+      if (value === sent.get(input.name)) continue;
+      if (input.type === "radio" || input.type === "checkbox") input.checked = input.value === value;
+      else input.value = value;
+    }
   }
   if (focused && document.activeElement.id !== focused) document.getElementById(focused)?.focus();
   draw();
