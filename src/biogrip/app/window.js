@@ -76,7 +76,7 @@ document.addEventListener("drop", (event) => {
 });
 
 // The picture: points of a column over another, and the range that is used.
-const [left, right, top_, bottom] = [60, 650, 10, 300];
+const [left, right, top_, bottom] = [90, 650, 10, 300];
 
 function draw() {
   const svg = document.querySelector("#picture svg");
