@@ -99,11 +99,28 @@ def _model_lines() -> list[str]:
     return [*lines, f"  {'jeffreys':<{width}}  Burgers fluid without its spring"]
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(prog="biogrip", description=__doc__)
+class _RaisingParser(_Parser):
+    """The same, of which a usage error is an error to catch."""
+
+    def error(self, message: str) -> NoReturn:
+        """Raise what would be printed."""
+        raise BiogripError(message)
+
+    def exit(self, status: int = 0, message: str | None = None) -> NoReturn:
+        """Do not exit."""
+        raise BiogripError(message or "allowed are options that set something.")
+
+
+def options_of(arguments: Sequence[str]) -> dict[str, Any]:
+    """Return what a command line asks for; what is wrong with it is a `BiogripError`."""
+    return vars(_parser(_RaisingParser).parse_args(arguments))
+
+
+def _parser(kind: type[_Parser] = _Parser) -> argparse.ArgumentParser:
+    parser = kind(prog="biogrip", description=__doc__)
     parser.add_argument("--version", action="version", version=f"biogrip {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    for add in (_add_identify, _add_groups, _add_design):
+    for add in (_add_identify, _add_groups, _add_design, _add_app):
         add(commands)
     return parser
 
@@ -217,3 +234,11 @@ def _add_design(commands: Any) -> None:
     design.add_argument("config", type=Path, help=text)
     text = "config of the designed study, YAML [CONFIG_designed.yaml]"
     _add_file(design, "--output", "OUTPUT", text)
+
+
+def _add_app(commands: Any) -> None:
+    text = "open a window of this machine: drop files, choose, see the answer and its command"
+    app = commands.add_parser("app", help=text, description=text)
+    app.set_defaults(command="biogrip.app.server:open_app")
+    app.add_argument("--port", type=int, metavar="PORT", help="of this machine [any that is free]")
+    app.add_argument("--no-browser", action="store_true", help="print the address only")
