@@ -135,9 +135,12 @@ def _tried(own: Sequence[_Own], names: Sequence[str]) -> list[FittedModels]:
         answers = {name: found[name][place] for name in names if place in found[name]}
         posed = {name: problems[name][place] for name in answers}
         if experiment.fit_start and not experiment.coloured:
-            answers = {
+            # No start makes up for what is far more than noise.
+            most = levels.WHITE * min(answer.misfit for answer in answers.values())
+            answers |= {
                 name: _at_own_onset(recording, experiment, name, posed[name], answer)
                 for name, answer in answers.items()
+                if answer.misfit < most
             }
         misfits = _misfits(growths[place], posed, answers)
         tried = ranked([*answers], misfits, fit.problem.residuals.samples)

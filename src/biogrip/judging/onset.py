@@ -180,26 +180,27 @@ class OnsetFits:
         """Fit the onset along near that of another fit, whose misfit is never exceeded.
 
         It goes on from interval to interval of `_smooth_intervals`, each from the best values of
-        the one before, until no neighbour has a lower misfit.
+        the one before, until no neighbour that was not tried has a lower misfit.
         """
+        tried = list[tuple[float, float]]()
         for _ in range(_MOST_STEPS):
             ends = [
                 (low_s, min(high_s, self._latest_s))
                 for low_s, high_s in self._smooth_intervals(best.onset_s)
                 if low_s < self._latest_s
             ]
-            found = min((self._within(best, *own) for own in ends), key=lambda fit: fit.misfit)
+            fits = [self._within(best, *own) for own in ends if own not in tried]
+            tried += ends
+            found = min([best, *fits], key=lambda fit: fit.misfit)
             if found.misfit >= best.misfit * (1 - _STILL):
                 return best
-            own, best = next(pair for pair in ends if best.onset_s <= pair[1]), found
-            if own[0] <= best.onset_s <= own[1]:
-                return best
+            best = found
         return best
 
     def _within(self, start: OnsetFit, low_s: float, high_s: float) -> OnsetFit:
         """Fit sample and onset within an interval, from the values of another fit."""
         inside_s = _INSIDE * (high_s - low_s)
-        problem = self.posed(start.onset_s)
+        problem, size = self.posed(start.onset_s), start.misfit or 1.0
         # Imported here: loading it takes longer than a short job.
         from scipy.optimize import least_squares
 
@@ -212,17 +213,18 @@ class OnsetFits:
         )
 
         def of(x: Array) -> Array:
-            return self.posed(x[-1]).residuals.left(x[:-1])
+            return self.posed(x[-1]).residuals.left(x[:-1]) / size
 
         def slopes(x: Array) -> Array:
             residuals, rows = self.posed(x[-1]).residuals(x[:-1])
             aside_s = inside_s if x[-1] < 0.5 * (low_s + high_s) else -inside_s
             moved = self.posed(x[-1] + aside_s).residuals.left(x[:-1]) - residuals
-            return np.vstack((rows, moved / aside_s)).T
+            return np.vstack((rows, moved / aside_s)).T / size
 
         first = np.clip(np.append(start.log_parameters, start.onset_s), low, high)
-        fit = least_squares(of, first, slopes, (low, high), x_scale="jac", max_nfev=_MOST_STEPS)
-        misfit = float(np.sqrt(2 * fit.cost / len(self.time_s)))
+        given = of, first, slopes, (low, high)
+        fit = least_squares(*given, x_scale="jac", ftol=_STILL, max_nfev=_MOST_STEPS)
+        misfit = size * float(np.sqrt(2 * fit.cost / len(self.time_s)))
         return OnsetFit(float(fit.x[-1]), fit.x[:-1], misfit)
 
     def _smooth_intervals(self, onset_s: float) -> Iterator[tuple[float, float]]:
