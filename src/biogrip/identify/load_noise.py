@@ -34,13 +34,14 @@ from biogrip.fit.any_sample import fit_responses, spread_lags
 from biogrip.fit.experiment import Experiment
 from biogrip.judging.whiteness import is_still
 from biogrip.physics.modes import lag_course
-from biogrip.physics.noise import ROOT_12, measure_rounding, without
+from biogrip.physics.noise import ROOT_12, estimate_noise, measure_rounding, without
 from biogrip.physics.protocol import with_steps
 from biogrip.traces.reader import Recording
 
-# Weights that are tried; change of a row over the median's that is no scatter; fewest rows.
+# Weights that are tried; change of a row over the median's that is no scatter; fewest rows, of
+# which fewer do not move if they scatter by so many of the sensor's noises.
 _WEIGHTS = 10.0 ** np.arange(-2, 13, 0.5)
-_FAR, _FEWEST = 8.0, 20
+_FAR, _FEWEST, _STILL = 8.0, 20, 2.0
 # Variance of a direction that is smoothed out, over that of one that is left; most numbers at once.
 _LEFT, _MOST_NUMBERS = 30.0, 20_000_000
 _LAGS_A_DECADE = 2
@@ -74,8 +75,9 @@ def with_its_steps(experiment: Experiment, recording: Recording) -> tuple[Experi
     the smoothed course better.
     """
     assert experiment.record is not None
-    record, uncertain_s = with_steps(experiment.record)
-    step, extent = measure_rounding(experiment.record[:, 1]), np.ptp(experiment.record[:, 1])
+    values = experiment.record[:, 1]
+    step, extent = measure_rounding(values), np.ptp(values)
+    record, uncertain_s = with_steps(experiment.record, noise_sd=estimate_noise(values, 0.0))
     if step and extent > levels.FEWEST_STEPS * step:
         other, other_s = with_steps(experiment.record, levels.ONE_STEP * step)
         smooth = np.column_stack((other[:, 0], smoothed(other[:, 1])[0]))
@@ -148,19 +150,19 @@ def smoothed(values: Array) -> tuple[Array, Array]:
     far = np.maximum(_FAR * np.median(changes), levels.ONE_STEP * step)
     ends = 1 + np.flatnonzero(changes > far)
     found, errors = values.copy(), [np.zeros((0, len(values)))]
+    noise_sd = estimate_noise(values, 0.0)
     for first, last in pairwise([0, *ends.tolist(), len(values)]):
         stretch, beside = values[first:last], ((0, 0), (first, len(values) - last))
-        if is_still(stretch):
+        few = last - first < _FEWEST and np.std(stretch) < _STILL * noise_sd
+        if few or is_still(stretch):
             found[first:last] = np.mean(stretch)
-            errors.append(np.pad(np.full((1, last - first), _error_of_mean(stretch)), beside))
+            scatter = max(float(np.std(stretch)), noise_sd * few)
+            error = np.full((1, last - first), scatter / np.sqrt(last - first))
+            errors.append(np.pad(error, beside))
         elif last - first >= _FEWEST:
             found[first:last], left = _graduated(stretch, step)
             errors.append(np.pad(left, beside))
     return found, np.vstack(errors)
-
-
-def _error_of_mean(values: Array) -> float:
-    return float(np.std(values)) / np.sqrt(len(values))
 
 
 def _graduated(values: Array, step: float) -> tuple[Array, Array]:
