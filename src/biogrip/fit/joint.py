@@ -1,0 +1,238 @@
+"""Several traces of one sample, as one trace: residuals are stacked, parameters are shared.
+
+Each trace is divided by its noise, whose standard deviation is known with some degrees of freedom.
+What its instrument may have added, an offset, a drift, a contact, stays its own: it is projected
+out of its own rows (`Condensed`), and so is, to first order, a start that is fitted along.
+"""
+
+from collections.abc import Iterator, Sequence
+from copy import copy
+from dataclasses import KW_ONLY, dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.fit.problem import TraceProblem
+from biogrip.physics.condensed import Condensed, SweptRows
+from biogrip.physics.modes import Modes, compute_modes
+from biogrip.physics.noise import moduli_of, places_of
+from biogrip.physics.protocol import is_storage, spacing_at
+from biogrip.physics.residuals import CondensedTrace, Residuals
+from biogrip.physics.sample_model import Network
+
+# Step of a start over the time between readings: none of them lies so close to a step.
+_OF_START = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class StackedRows(Condensed):
+    """Condensed rows of several traces, one after the other, each over its noise."""
+
+    _: KW_ONLY
+    rows: tuple[Condensed, ...]
+    noise_sd: Array
+    """Standard deviation of the noise of each, (n_traces,)."""
+
+    def _each(self, samples: Array) -> Iterator[tuple[Condensed, Array]]:
+        ends = np.cumsum([len(rows.all_s) for rows in self.rows])[:-1]
+        yield from zip(self.rows, np.split(samples, ends, axis=-1), strict=True)
+
+    def cleared(self, rows: Array) -> Array:
+        """Project nuisance out of functions, (..., n_samples), and whiten noise, of each trace."""
+        return np.concatenate([of.cleared(part) for of, part in self._each(rows)], axis=-1)
+
+    def of_trace(self, readings: Array) -> Array:
+        """Return rows of all traces without nuisance, (n_rows,)."""
+        return np.concatenate([of.of_trace(part) for of, part in self._each(readings)])
+
+    def of_modes(self, modes: Modes) -> Array:  # type: ignore[override]
+        """Return rows of samples, (n, 1 + n_parameters, n_rows), whose modes all traces share."""
+        rows = zip(self.rows, self.noise_sd, strict=True)
+        return np.concatenate([of.of_modes(modes) / sd for of, sd in rows], axis=-1)
+
+    @property
+    def taken(self) -> Array:
+        """Functions of free amplitude, (n_taken, n_samples), each of one trace."""
+        first, every = 0, list[Array]()
+        for of in self.rows:
+            last = first + len(of.all_s)
+            every.append(np.pad(of.taken, ((0, 0), (first, len(self.all_s) - last))))
+            first = last
+        return np.vstack(every)
+
+
+@dataclass(frozen=True, eq=False)
+class StackedResiduals(Residuals):
+    """Residuals of several traces of one sample, one after the other, each over its noise."""
+
+    noise_sd: Array = field(default_factory=lambda: np.ones(0))
+    """Standard deviation of the noise of each of the `parts`, (n_traces,)."""
+
+    @property
+    def _pairs(self) -> Iterator[tuple[Residuals, Any]]:
+        yield from zip(self.parts, self.noise_sd, strict=True)
+
+    @property
+    def duration_s(self) -> float:
+        """Time of the last reading of any trace, or the longest that a sweep tells of."""
+        return max(part.duration_s for part in self.parts)
+
+    @property
+    def covered_s(self) -> tuple[float, float]:
+        """From when to when after a change there are readings, of any trace."""
+        firsts, lasts = zip(*(part.covered_s for part in self.parts), strict=True)
+        return min(firsts), max(lasts)
+
+    def grip(self, log_parameters: Array) -> None:
+        """Return nothing: the force of the jaws is told of each trace."""
+
+    def ring(self, network: Network, noise_sd: float) -> None:
+        """Return nothing: the ring of the arms is told of each trace."""
+
+    @cached_property
+    def of_responses(self) -> tuple[Any, ...]:
+        """What responses depend on."""
+        return tuple((part.of_responses, float(sd)) for part, sd in self._pairs)
+
+    def condensed_responses(self, log_parameters: Array, *, slopes: bool = True) -> Array:
+        """Compute rows, (n, 1 + n_parameters, n_rows): traces of one kind share their modes."""
+        parameters, modes, rows = np.exp(log_parameters), dict[Any, Modes](), list[Array]()
+        for part, sd in self._pairs:
+            kind = part.gripper, part.model, part.course.deforms
+            if kind not in modes:
+                given = part.gripper, part.model, part.course
+                modes[kind] = compute_modes(*given, parameters, slopes=slopes)
+            rows.append(part.trace.condensed.of_modes(modes[kind]) / sd)
+        return np.concatenate(rows, axis=-1)
+
+    def of_lags(self, rates: Array) -> Array:
+        """Return what lags of unit amplitude show, (n_rates, n_samples)."""
+        return np.concatenate([part.of_lags(rates) / sd for part, sd in self._pairs], axis=-1)
+
+    def simulated(self, log_parameters: Array) -> Array:
+        """Return responses and derivatives, not cleared, (1 + n_parameters, n_samples)."""
+        rows = [part.simulated(log_parameters) / sd for part, sd in self._pairs]
+        return np.concatenate(rows, axis=-1)
+
+
+def stack(
+    problems: Sequence[TraceProblem], noise_sd: Array, freedom: float = np.inf
+) -> TraceProblem:
+    """Return the problem of one sample of several traces.
+
+    Parameters
+    ----------
+    problems
+        The problem of each trace; models have the same parameters.
+    noise_sd : (n_traces,)
+        Standard deviation of the noise of each, in the unit of its readings.
+    freedom
+        Degrees of freedom with which the noise is known.
+    """
+    residuals = _stacked([problem.residuals for problem in problems], noise_sd, freedom)
+    low = np.min([problem.low for problem in problems], axis=0)
+    high = np.max([problem.high for problem in problems], axis=0)
+    return TraceProblem(residuals, low, high, problems[0].ranges)
+
+
+def _stacked(parts: Sequence[Residuals], noise_sd: Array, freedom: float) -> StackedResiduals:
+    rows = tuple(part.trace.condensed for part in parts)
+    first, every_s = parts[0], np.concatenate([of.all_s for of in rows])
+    pairs = [*zip(parts, noise_sd, strict=True)]
+    readings = np.concatenate([part.trace.readings / sd for part, sd in pairs])
+    condensed = StackedRows(
+        first.course, every_s, np.zeros((0, len(every_s))), rows=rows, noise_sd=noise_sd
+    )
+    given = first.gripper, first.model, first.course
+    return StackedResiduals(
+        *(*given, CondensedTrace(readings, condensed, None if freedom < np.inf else 1.0, 1.0)),
+        instrument=first.instrument,
+        freedom=freedom,
+        parts=tuple(parts),
+        noise_sd=noise_sd,
+    )
+
+
+def with_free_start(problem: TraceProblem, best: Array) -> TraceProblem:
+    """Return a problem whose protocol may start a little sooner or later than at its best fit.
+
+    The derivative of the response by the start, at log-parameters (n_parameters,), is projected
+    out: limits then allow for it, to first order.
+    """
+    residuals = problem.residuals
+    step_s = _OF_START * spacing_at(residuals.trace.time_s, 0.0)
+    ends = [residuals.later(sign * step_s).response(best) for sign in (1, -1)]
+    rows = residuals.trace.condensed
+    by_start = rows.cleared(ends[0] - ends[1])
+    nuisance = np.vstack((rows.nuisance, by_start / np.linalg.norm(by_start)))
+    if rows.whitening is None:
+        rows = replace(rows, functions=nuisance)
+    else:
+        whitening = copy(rows.whitening)
+        whitening.nuisance = nuisance
+        rows = replace(rows, whitening=whitening)
+    trace = replace(residuals.trace, condensed=rows, known_scatter=residuals.trace.scatter)
+    return replace(problem, residuals=replace(residuals, trace=trace))
+
+
+@dataclass(frozen=True, eq=False)
+class _InverseRows(SweptRows):
+    """Rows of a sweep by what its sample yields, G* = G*^2 J*, with moduli G* as measured."""
+
+    _: KW_ONLY
+    readings: Array
+
+    def of_modes(self, modes: Modes) -> Array:  # type: ignore[override]
+        """Return rows of lags, (n_rates, 1, n_samples), of rates that modes have one each."""
+        return self.cleared(self.of_lags(-modes.rates[:, 0]))[:, None]
+
+    def of_lags(self, rates: Array) -> Array:
+        """Return what lags of unit compliance add to the moduli, (n_rates, n_samples)."""
+        stored, lost = moduli_of(self.readings, self.all_s)
+        omega = self.all_s[is_storage(self.all_s)]
+        shown = (stored + 1j * lost) ** 2 / (1 + 1j * omega / rates[:, None])
+        return places_of(np.stack((shown.real, shown.imag), axis=-2), self.all_s)
+
+
+@dataclass(frozen=True, eq=False)
+class _SweptCompliance(Residuals):
+    """A sweep as one of traces under a load."""
+
+    def of_lags(self, rates: Array) -> Array:
+        """Return what lags of unit compliance add to the moduli, (n_rates, n_samples)."""
+        assert isinstance(self.trace.condensed, _InverseRows)
+        return self.trace.condensed.of_lags(rates)
+
+
+def of_one_kind(residuals: Residuals) -> tuple[Residuals, int]:
+    """Return the residuals of the traces that tell together of any linear sample, and their number.
+
+    Under a load a sample's lags add, under a deformation what they leave does, and of grippers each
+    has its own. Of traces of several kinds the most are taken. A sweep is of both: to first order
+    in its noise, its compliances are the inverse of its moduli.
+    """
+    assert isinstance(residuals, StackedResiduals)
+    pairs = [*zip(residuals.parts, residuals.noise_sd, strict=True)]
+    sweeps = [(part, sd) for part, sd in pairs if part.course.sweeps]
+    inverse = [(_inverse(part), sd) for part, sd in sweeps if np.ptp(is_storage(part.trace.time_s))]
+    kinds: dict[Any, list[tuple[Residuals, Any]]] = {}
+    for part, sd in pairs:
+        if not part.course.sweeps:
+            kinds.setdefault((part.gripper, part.course.deforms), []).append((part, sd))
+    for (_, deforms), of_kind in kinds.items():
+        jaws = of_kind[0][0].instrument.has_jaws
+        of_kind += [] if jaws else sweeps if deforms else inverse
+    parts, noise_sd = zip(*max([*kinds.values(), sweeps], key=len), strict=True)
+    return _stacked(parts, np.array(noise_sd), residuals.freedom), len(parts)
+
+
+def _inverse(part: Residuals) -> Residuals:
+    """Return the residuals of a sweep as those of a trace under a load."""
+    rows, readings = part.trace.condensed, part.trace.readings
+    given = rows.course, rows.all_s, rows.functions, rows.whitening
+    trace = replace(part.trace, condensed=_InverseRows(*given, readings=readings))
+    return _SweptCompliance(
+        part.gripper, part.model, part.course, trace, instrument=part.instrument
+    )
