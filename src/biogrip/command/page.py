@@ -25,15 +25,16 @@ from biogrip.command.words import (
 from biogrip.digits import with_unit
 from biogrip.figures import style
 from biogrip.figures.cells import ONE_COLUMN_IN, draw_cells
-from biogrip.figures.fit import draw_fit, fit_of
+from biogrip.figures.fit import draw_fit, draw_together, fit_of
 from biogrip.figures.likelihood import draw_profiles_of
 from biogrip.files import write_text
+from biogrip.identify.together import Together
 from biogrip.judging.cells import CELL, Told, compare, gather, shared_columns
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.judging.doubts import DOUBTFUL, OK, REJECTED
 from biogrip.judging.without_model import LEVEL, level_turned
 from biogrip.page.templates import data_url, environment
-from biogrip.physics.protocol import evaluate, hold, join_phases
+from biogrip.physics.protocol import evaluate, hold, join_phases, largest_load
 from biogrip.physics.simulation import simulated_response
 from biogrip.terminal import visible_lines
 
@@ -51,9 +52,9 @@ def trace_pictures(diagnosis: Diagnosis, data: Mapping[str, Any]) -> list[str]:
 
     A third one is of the level over time, as far as that is told without a model.
     """
-    drawn = draw_best(diagnosis)
+    drawn, told = draw_best(diagnosis), data["without_model"]["quantities"]
     with style.styled():
-        more = [draw_level(diagnosis, data)] if data["without_model"]["quantities"] else []
+        more = [draw_level(diagnosis, data)] if told and diagnosis.recording else []
         return [_address(picture) for picture in (drawn, draw_profiles_of(data), *more)]
 
 
@@ -88,11 +89,29 @@ def draw_level(diagnosis: Diagnosis, data: Mapping[str, Any]) -> Figure:
     return drawn
 
 
+def draw_joint(diagnosis: Together) -> Figure:
+    """Draw every trace of a sample, what the joint fit shows, and residuals over the noise."""
+    values = {finding.quantity.label: finding.value for finding in diagnosis.findings}
+    fits, loads = {}, list[tuple[float, str]]()
+    for name, single in zip(diagnosis.names, diagnosis.traces, strict=True):
+        recording, experiment = single.identified
+        noise_sd = recording.sd if recording.sd is not None else single.likelihood.noise_sd
+        trace = recording.time_s, recording.readings, np.asarray(noise_sd)
+        fits[name], instrument = fit_of(experiment, values, *trace), experiment.instrument
+        relative = instrument.relative or instrument.sweeps
+        load, unit = abs(largest_load(experiment.phases)), instrument.controlled.unit or "1"
+        loads.append((1.0, "") if relative else (load, unit))
+    with style.styled():
+        return draw_together(fits, loads)
+
+
 def draw_best(diagnosis: Diagnosis) -> Figure:
     """Draw a trace, its best fit and the residuals over the time of the file's clock.
 
     Where readings spread over decades after the protocol's start, time is counted from there.
     """
+    if isinstance(diagnosis, Together):
+        return draw_joint(diagnosis)
     recording, experiment = diagnosis.identified
     values = {finding.quantity.label: finding.value for finding in diagnosis.findings}
     fit = fit_of(experiment, values, recording.time_s, recording.readings, recording.sd)

@@ -7,7 +7,7 @@
 """
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from biogrip.digits import p_value, plain, with_limits
 from biogrip.errors import BiogripError
 from biogrip.fit.joint import of_one_kind, stack, with_free_start
 from biogrip.fit.least_squares import identify_many
+from biogrip.fit.nested_fits import FittedModels
 from biogrip.identify.data import judged_data, moduli_between
 from biogrip.judging.agreement import Agreement, compare_traces, shared_freedom
 from biogrip.judging.diagnosis import Diagnosis, lower_fit, profile_all, with_notes, with_times
@@ -30,21 +31,17 @@ _NOT_TOLD = ": repeat the first trace at the end to tell which"
 _KNOWN = 1e8
 
 
-@dataclass(frozen=True)
-class Together:
-    """The diagnosis of one sample of several traces."""
+@dataclass(frozen=True, repr=False)
+class Together(Diagnosis):
+    """The diagnosis of one sample of several traces: limits are of their joint likelihood."""
 
-    joint: Diagnosis
-    """Shared parameters, with limits of the joint likelihood, and notes."""
+    _: KW_ONLY
+    names: tuple[str, ...]
+    """Of the traces."""
     traces: tuple[Diagnosis, ...]
     """The diagnosis of each trace by itself."""
     agreement: Agreement
     """Whether the traces are of one sample."""
-
-    @property
-    def status(self) -> str:
-        """Status of the joint fit."""
-        return self.joint.status
 
     def without_model(
         self, at_s: Sequence[float] = (), kinds: Collection[str] = KINDS
@@ -53,19 +50,22 @@ class Together:
 
         Of traces that do not agree it tells no more than their misfit.
         """
-        residuals, _ = of_one_kind(self.joint.likelihood.problem.residuals)
+        residuals, _ = of_one_kind(self.likelihood.problem.residuals)
         kinds = kinds if self.agreement.holds else ()
-        confidence = self.joint.likelihood.confidence
+        confidence = self.likelihood.confidence
         return tell_without_model(residuals, confidence=confidence, at_s=at_s, kinds=kinds)
 
     def data(self) -> dict[str, Any]:
         """Return what is said of the sample and not of one trace, as plain data."""
-        agreement, rejected = self.agreement, self.status == REJECTED
-        spread_s = self.joint.likelihood.problem.residuals.covered_s
+        agreement, rejected, experiment = self.agreement, self.status == REJECTED, self.experiment
+        assert experiment is not None
+        spread_s = self.likelihood.problem.residuals.covered_s
         return {
-            **judged_data(self.joint),
+            **judged_data(self),
+            "noise_model": None,
+            **FittedModels(experiment.sample.candidate).data(rejected=rejected),
             "limits": "Limits are of the joint likelihood: each trace counts by its own noise.",
-            "moduli": None if rejected else moduli_between(*spread_s, self.joint),
+            "moduli": None if rejected else moduli_between(*spread_s, self),
             "agreement": {
                 "holds": agreement.holds,
                 "p": agreement.chance,
@@ -77,7 +77,7 @@ class Together:
         }
 
 
-def identify_together(names: Sequence[str], diagnoses: Sequence[Diagnosis]) -> Together:
+def sample_of(names: Sequence[str], diagnoses: Sequence[Diagnosis]) -> Together:
     """Identify one sample from several traces that were identified by themselves.
 
     Parameters
@@ -119,7 +119,8 @@ def identify_together(names: Sequence[str], diagnoses: Sequence[Diagnosis]) -> T
         notes.append(Note(REJECTION, _differences(names, diagnoses, agreement)))
     judged = with_notes(replace(judged, converged=fit.converged), notes)
     (judged,) = with_times([judged])
-    return Together(replace(judged, experiment=experiments[0]), tuple(diagnoses), agreement)
+    given = {**vars(judged), "experiment": experiments[0]}
+    return Together(**given, names=tuple(names), traces=tuple(diagnoses), agreement=agreement)
 
 
 def _single(diagnosis: Diagnosis) -> Likelihood:
