@@ -216,7 +216,9 @@ def of_one_kind(residuals: Residuals) -> tuple[Residuals, int]:
     assert isinstance(residuals, StackedResiduals)
     pairs = [*zip(residuals.parts, residuals.noise_sd, strict=True)]
     sweeps = [(part, sd) for part, sd in pairs if part.course.sweeps]
-    inverse = [(_inverse(part), sd) for part, sd in sweeps if np.ptp(is_storage(part.trace.time_s))]
+    inverse = [
+        (_inverse(part), sd) for part, sd in sweeps if len({*is_storage(part.trace.time_s)}) > 1
+    ]
     kinds: dict[Any, list[tuple[Residuals, Any]]] = {}
     for part, sd in pairs:
         if not part.course.sweeps:
