@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from threadpoolctl import threadpool_limits
 
 from biogrip.arrays import Array, as_column
-from biogrip.command.files import data_of, data_of_sample
+from biogrip.command.files import data_of, sample_of
 from biogrip.command.options import Setting
 from biogrip.command.outputs import Outcome, table_of
 from biogrip.command.settings import MODEL, Asked, read_trace
@@ -26,7 +26,6 @@ from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import identify_many
 from biogrip.fit.problem import Fit, GeneRange, silent
 from biogrip.identify.identify import identify
-from biogrip.identify.together import sample_of
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.physics.gripper import NO_ARMS, Arm, Gripper
 from biogrip.physics.instruments import GRIPPER, INSTRUMENTS, Instrument
@@ -269,16 +268,13 @@ def identify_together(
     BiogripError
         If a trace cannot be used, or they have not one model, unit of stiffness and confidence.
     """
-    given = (
-        traces
-        if isinstance(traces, Mapping)
-        else {f"trace {number}": arguments for number, arguments in enumerate(traces, start=1)}
-    )
+    given = traces
+    if not isinstance(given, Mapping):
+        given = {f"trace {number}": arguments for number, arguments in enumerate(given, start=1)}
     results = {name: identify_trace(**{**shared, **own}) for name, own in given.items()}
-    joint = sample_of([*results], [result.diagnosis for result in results.values()])
-    said = [{**result.data, "trace": name} for name, result in results.items()]
-    data = _with_arguments(data_of_sample(joint, "sample", said))
-    return TraceResult(joint, data, {"traces": given, **shared})
+    said = {name: (one.diagnosis, {**one.data, "trace": name}) for name, one in results.items()}
+    sample, data = sample_of("sample", said)
+    return TraceResult(sample, _with_arguments(data), {"traces": given, **shared})
 
 
 def to_table(

@@ -41,7 +41,7 @@ from biogrip.identify.data import trace_data
 from biogrip.identify.identify import STEPS, budget, identify_alike
 from biogrip.identify.other_fits import Trace
 from biogrip.identify.prepare import prepare
-from biogrip.identify.together import Together, sample_of
+from biogrip.identify.together import Together, identify_sample_of
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.keys import plain
 from biogrip.processes import end_with
@@ -87,7 +87,7 @@ def identify_files(
     Return 1 if any of several traces could not be used. A `BiogripError` says that an option, the
     config or the only trace cannot.
     """
-    asked = by_sample(traces_of(files, config, settings), together=together)
+    asked = [*by_sample(traces_of(files, config, settings), together=together)]
     alone = together or (len(files) == 1 and asked[0].place == Asked.place)
     if rows is not None:
         # The last may be beyond the end.
@@ -274,25 +274,21 @@ def identify_batch(
                 read[number] = case, prepare(recording, case.judged_experiment)
         read = {of: it for of, it in read.items() if asked[every[of][0]].name not in refused}
         results: dict[int, dict[str, Any]] = {}
-        judged = defaultdict[int, dict[int, Diagnosis]](dict)
-        for number, found in _diagnosed([asked[of] for of, _ in every], read, refused, told):
-            index = every[number][0]
+        parts = defaultdict[int, dict[int, tuple[Diagnosis, dict[str, Any]]]](dict)
+        for number, diagnosis in _diagnosed([asked[of] for of, _ in every], read, refused, told):
+            index, own = every[number]
             trace = asked[index]
-            judged[index][number] = found
-            if len(judged[index]) < len(trace.traces):
-                continue
-            diagnosis = found
             with _caught(trace, refused):
-                numbers = sorted(judged[index])
-                said = [
-                    data_of(judged[index][of], read[of][0], own.name, own.given)
-                    for of, own in zip(numbers, trace.traces, strict=True)
-                ]
-                results[index] = said[0]
+                data = data_of(diagnosis, read[number][0], own.name, own.given)
+                parts[index][number] = diagnosis, data
+                if len(parts[index]) < len(trace.traces):
+                    continue
                 if trace.together:
-                    names, diagnoses = [own.name for own in trace.together], judged[index]
-                    diagnosis = sample_of(names, [diagnoses[of] for of in numbers])
-                    results[index] = data_of_sample(diagnosis, trace.name, said)
+                    names = [own.name for own in trace.together]
+                    given = [said for _, said in sorted(parts[index].items())]
+                    diagnosis, data = sample_of(trace.name, dict(zip(names, given, strict=True)))
+                results[index] = data
+                del parts[index]
             if index in results and outputs is not None:
                 write_result(outputs[index], results[index], made_from[index])
             if index in results and drawn:
@@ -385,14 +381,19 @@ def data_of(
     }
 
 
-def data_of_sample(
-    diagnosis: Together, sample: str, traces: Sequence[dict[str, Any]]
-) -> dict[str, Any]:
-    """Return all that is said of a sample as plain data, and of each of its traces (`data_of`)."""
-    shared = {key: it for key, it in traces[0].items() if key not in _OF_ONE_TRACE}
+def sample_of(
+    name: str, traces: Mapping[str, tuple[Diagnosis, dict[str, Any]]]
+) -> tuple[Together, dict[str, Any]]:
+    """Identify a sample from traces that were; return it, and all that is said of it as plain data.
+
+    Of each trace, by name, there are its diagnosis and its `data_of`.
+    """
+    diagnoses, said = zip(*traces.values(), strict=True)
+    sample = identify_sample_of([*traces], diagnoses)
+    shared = {key: it for key, it in said[0].items() if key not in _OF_ONE_TRACE}
     at_s = shared["assumed"]["identifiability"]["at_s"]
-    without = {"without_model": diagnosis.without_model(at_s).data(), "traces": [*traces]}
-    return {**shared, "trace": sample, **diagnosis.data(), **without}
+    without = {"without_model": sample.without_model(at_s).data(), "traces": [*said]}
+    return sample, {**shared, "trace": name, **sample.data(), **without}
 
 
 def _assumed(found: Experiment, case: SampleCase, tried: Sequence[str]) -> dict[str, Any]:

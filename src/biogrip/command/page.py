@@ -5,6 +5,7 @@ Pictures are Matplotlib's. A page of very many traces has the figure and the tab
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ from biogrip.command.words import (
 from biogrip.digits import with_unit
 from biogrip.figures import style
 from biogrip.figures.cells import ONE_COLUMN_IN, draw_cells
-from biogrip.figures.fit import draw_fit, draw_together, fit_of
+from biogrip.figures.fit import draw_fit, fit_of
 from biogrip.figures.likelihood import draw_profiles_of
 from biogrip.files import write_text
 from biogrip.identify.together import Together
@@ -89,20 +90,39 @@ def draw_level(diagnosis: Diagnosis, data: Mapping[str, Any]) -> Figure:
     return drawn
 
 
-def draw_joint(diagnosis: Together) -> Figure:
-    """Draw every trace of a sample, what the joint fit shows, and residuals over the noise."""
-    values = {finding.quantity.label: finding.value for finding in diagnosis.findings}
-    fits, loads = {}, list[tuple[float, str]]()
-    for name, single in zip(diagnosis.names, diagnosis.traces, strict=True):
+def draw_joint(sample: Together) -> Figure:
+    """Draw every trace of a sample, what the joint fit shows, and residuals over the noise.
+
+    Traces that read one quantity share a panel, each over its largest load, but of a sweep, or
+    where what is read is relative to it.
+    """
+    values = {finding.quantity.label: finding.value for finding in sample.findings}
+    reads = dict.fromkeys(single.identified[1].instrument.read for single in sample.traces)
+    drawn = style.figure(style.COLUMN_IN * len(reads), 3.6)
+    panels = drawn.subplots(2, len(reads), sharex="col", squeeze=False, height_ratios=[2.4, 1])
+    colors = cycle(style.COLORS.values())
+    for name, single, color in zip(sample.names, sample.traces, colors, strict=False):
         recording, experiment = single.identified
-        noise_sd = recording.sd if recording.sd is not None else single.likelihood.noise_sd
-        trace = recording.time_s, recording.readings, np.asarray(noise_sd)
-        fits[name], instrument = fit_of(experiment, values, *trace), experiment.instrument
-        relative = instrument.relative or instrument.sweeps
-        load, unit = abs(largest_load(experiment.phases)), instrument.controlled.unit or "1"
-        loads.append((1.0, "") if relative else (load, unit))
-    with style.styled():
-        return draw_together(fits, loads)
+        instrument = experiment.instrument
+        fit = fit_of(experiment, values, recording.time_s, recording.readings, recording.sd)
+        top, below = panels[:, [*reads].index(instrument.read)]
+        alone = instrument.relative or instrument.sweeps
+        load = 1.0 if alone else abs(largest_load(experiment.phases))
+        noise_sd = single.likelihood.noise_sd if fit.sd is None else fit.sd
+        at, left = np.abs(fit.time_s), (fit.measured - fit.fitted) / noise_sd
+        for axes, values_of in ((top, fit.measured / load), (below, left)):
+            axes.plot(at, values_of, ".", color=color, markersize=1.2)
+        look = "_" if instrument.sweeps else "-"
+        top.plot(at, fit.fitted / load, look, color=color, label=style.literal(name))
+        unit = f"{fit.read.unit or 1}/{instrument.controlled.unit or 1}"
+        over = "" if alone else f" over {instrument.controlled.name}"
+        top.set_ylabel(with_unit(fit.read.title + over, fit.read.unit if alone else unit))
+        below.set_xlabel("angular frequency (rad/s)" if instrument.sweeps else "time (s)")
+        if instrument.sweeps:
+            top.set(xscale="log", yscale="log")
+    panels[1, 0].set_ylabel("residual over noise")
+    drawn.legend(loc="outside upper left", ncols=2)
+    return drawn
 
 
 def draw_best(diagnosis: Diagnosis) -> Figure:
@@ -111,7 +131,8 @@ def draw_best(diagnosis: Diagnosis) -> Figure:
     Where readings spread over decades after the protocol's start, time is counted from there.
     """
     if isinstance(diagnosis, Together):
-        return draw_joint(diagnosis)
+        with style.styled():
+            return draw_joint(diagnosis)
     recording, experiment = diagnosis.identified
     values = {finding.quantity.label: finding.value for finding in diagnosis.findings}
     fit = fit_of(experiment, values, recording.time_s, recording.readings, recording.sd)

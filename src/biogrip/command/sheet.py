@@ -14,6 +14,7 @@ from difflib import get_close_matches
 from io import StringIO
 from itertools import zip_longest
 from pathlib import Path
+from typing import Any
 
 from biogrip.command.options import OPTIONS, REPLACED, Setting
 from biogrip.command.outputs import COLUMNS
@@ -139,8 +140,8 @@ def read_table(
     return found
 
 
-def by_sample(asked: Sequence[Asked], *, together: bool = False) -> list[Asked]:
-    """Return samples: rows with one name in a column `sample` are of one, or all `together` are.
+def by_sample(asked: Sequence[Asked], *, together: bool = False) -> Iterator[Asked]:
+    """Yield samples: rows with one name in a column `sample` are of one, or all `together` are.
 
     Of other cells, those that differ within a sample stand side by side.
     """
@@ -148,21 +149,13 @@ def by_sample(asked: Sequence[Asked], *, together: bool = False) -> list[Asked]:
     for own in asked:
         cells = {_plain(name): cell for name, cell in own.copied.items()}
         samples[_TOGETHER if together else cells.get(_SAMPLE) or own.name].append(own)
-    return [
-        replace(
-            traces[0],
-            part="",
-            sample=name,
-            together=tuple(traces),
-            copied={
-                column: "; ".join(dict.fromkeys(own.copied.get(column, "") for own in traces))
-                for column in traces[0].copied
-            },
-        )
-        if traces[1:]
-        else traces[0]
-        for name, traces in samples.items()
-    ]
+    for name, traces in samples.items():
+        first, cells = traces[0], {}
+        for column in first.copied:
+            every = dict.fromkeys(own.copied.get(column, "") for own in traces)
+            cells[column] = "; ".join(every)
+        several: dict[str, Any] = {"sample": name, "together": tuple(traces), "copied": cells}
+        yield replace(first, **several) if traces[1:] else first
 
 
 def _parts(traces: Sequence[Path], set_by: Sequence[Mapping[str, str]]) -> list[str]:

@@ -1,8 +1,7 @@
 """A trace, the responses fitted to it, and what they leave."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -143,37 +142,6 @@ def draw_fit(
         residuals.set_xscale("log")
         if low > 0:
             traces.set(yscale="log", ylim=(0.8 * factor * low, 1.25 * factor * high))
-    drawn.align_ylabels()
-    return drawn
-
-
-def draw_together(fits: Mapping[str, FittedTrace], loads: Sequence[tuple[float, str]]) -> Figure:
-    """Draw traces of one sample and what one sample shows, with residuals over the noise.
-
-    Those that read one quantity share a panel, each over its largest load, which has a unit; as
-    1, without one, where what is read is relative to it. Fits have the noise of each as `sd`.
-    """
-    places = {
-        name: place for place, name in enumerate({of.read.name: None for of in fits.values()})
-    }
-    drawn = style.figure(style.COLUMN_IN * len(places), 3.6)
-    panels = drawn.subplots(2, len(places), sharex="col", squeeze=False, height_ratios=[2.4, 1])
-    for (name, fit), (load, unit), color in zip(fits.items(), loads, cycle(style.COLORS.values())):
-        top, below = panels[:, places[fit.read.name]]
-        at, look = np.abs(fit.time_s), _readings(len(fit.time_s)) | {"color": color}
-        top.plot(at, fit.measured / load, **look)
-        below.plot(at, (fit.measured - fit.fitted) / np.asarray(fit.sd), **look)
-        for of in (is_storage(fit.time_s), ~is_storage(fit.time_s)):
-            top.plot(at[of], fit.fitted[of] / load, color=color)
-        top.plot([], [], color=color, label=style.literal(name))
-        sweeps, over = INSTRUMENTS[fit.read.name].sweeps, f"{fit.read.unit or 1}/{unit}"
-        top.set_ylabel(with_unit(fit.read.title, over if unit else fit.read.unit))
-        below.set_xlabel("angular frequency (rad/s)" if sweeps else "time (s)")
-        below.axhline(0, color=style.FITTED, linewidth=0.8)
-        if sweeps:
-            top.set(xscale="log", yscale="log")
-    panels[1, 0].set_ylabel("residual / noise")
-    drawn.legend(loc="outside upper left", ncols=2)
     drawn.align_ylabels()
     return drawn
 

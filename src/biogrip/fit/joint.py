@@ -8,7 +8,6 @@ out of its own rows (`Condensed`), and so is, to first order, a start that is fi
 from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import KW_ONLY, dataclass, field, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -49,18 +48,15 @@ class StackedRows(Condensed):
 
     def of_modes(self, modes: Modes) -> Array:  # type: ignore[override]
         """Return rows of samples, (n, 1 + n_parameters, n_rows), whose modes all traces share."""
-        rows = zip(self.rows, self.noise_sd, strict=True)
-        return np.concatenate([of.of_modes(modes) / sd for of, sd in rows], axis=-1)
+        pairs = zip(self.rows, self.noise_sd, strict=True)
+        return np.concatenate([of.of_modes(modes) / sd for of, sd in pairs], axis=-1)
 
     @property
     def taken(self) -> Array:
         """Functions of free amplitude, (n_taken, n_samples), each of one trace."""
-        first, every = 0, list[Array]()
-        for of in self.rows:
-            last = first + len(of.all_s)
-            every.append(np.pad(of.taken, ((0, 0), (first, len(self.all_s) - last))))
-            first = last
-        return np.vstack(every)
+        from scipy.linalg import block_diag
+
+        return np.asarray(block_diag(*(of.taken for of in self.rows)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,8 +67,9 @@ class StackedResiduals(Residuals):
     """Standard deviation of the noise of each of the `parts`, (n_traces,)."""
 
     @property
-    def _pairs(self) -> Iterator[tuple[Residuals, Any]]:
-        yield from zip(self.parts, self.noise_sd, strict=True)
+    def pairs(self) -> list[tuple[Residuals, Any]]:
+        """Residuals of each trace with the standard deviation of its noise."""
+        return [*zip(self.parts, self.noise_sd, strict=True)]
 
     @property
     def duration_s(self) -> float:
@@ -91,29 +88,29 @@ class StackedResiduals(Residuals):
     def ring(self, network: Network, noise_sd: float) -> None:
         """Return nothing: the ring of the arms is told of each trace."""
 
-    @cached_property
+    @property
     def of_responses(self) -> tuple[Any, ...]:
         """What responses depend on."""
-        return tuple((part.of_responses, float(sd)) for part, sd in self._pairs)
+        return tuple((part.of_responses, float(sd)) for part, sd in self.pairs)
 
     def condensed_responses(self, log_parameters: Array, *, slopes: bool = True) -> Array:
         """Compute rows, (n, 1 + n_parameters, n_rows): traces of one kind share their modes."""
         parameters, modes, rows = np.exp(log_parameters), dict[Any, Modes](), list[Array]()
-        for part, sd in self._pairs:
+        for part, sd in self.pairs:
             kind = part.gripper, part.model, part.course.deforms
             if kind not in modes:
-                given = part.gripper, part.model, part.course
-                modes[kind] = compute_modes(*given, parameters, slopes=slopes)
+                given = part.gripper, part.model, part.course, parameters
+                modes[kind] = compute_modes(*given, slopes=slopes)
             rows.append(part.trace.condensed.of_modes(modes[kind]) / sd)
         return np.concatenate(rows, axis=-1)
 
     def of_lags(self, rates: Array) -> Array:
         """Return what lags of unit amplitude show, (n_rates, n_samples)."""
-        return np.concatenate([part.of_lags(rates) / sd for part, sd in self._pairs], axis=-1)
+        return np.concatenate([part.of_lags(rates) / sd for part, sd in self.pairs], axis=-1)
 
     def simulated(self, log_parameters: Array) -> Array:
         """Return responses and derivatives, not cleared, (1 + n_parameters, n_samples)."""
-        rows = [part.simulated(log_parameters) / sd for part, sd in self._pairs]
+        rows = [part.simulated(log_parameters) / sd for part, sd in self.pairs]
         return np.concatenate(rows, axis=-1)
 
 
@@ -131,28 +128,22 @@ def stack(
     freedom
         Degrees of freedom with which the noise is known.
     """
-    residuals = _stacked([problem.residuals for problem in problems], noise_sd, freedom)
     low = np.min([problem.low for problem in problems], axis=0)
     high = np.max([problem.high for problem in problems], axis=0)
+    residuals = _stacked([problem.residuals for problem in problems], noise_sd, freedom)
     return TraceProblem(residuals, low, high, problems[0].ranges)
 
 
 def _stacked(parts: Sequence[Residuals], noise_sd: Array, freedom: float) -> StackedResiduals:
-    rows = tuple(part.trace.condensed for part in parts)
-    first, every_s = parts[0], np.concatenate([of.all_s for of in rows])
-    pairs = [*zip(parts, noise_sd, strict=True)]
+    first, rows = parts[0], tuple(part.trace.condensed for part in parts)
+    pairs, every_s = zip(parts, noise_sd, strict=True), np.concatenate([of.all_s for of in rows])
     readings = np.concatenate([part.trace.readings / sd for part, sd in pairs])
-    condensed = StackedRows(
-        first.course, every_s, np.zeros((0, len(every_s))), rows=rows, noise_sd=noise_sd
-    )
-    given = first.gripper, first.model, first.course
-    return StackedResiduals(
-        *(*given, CondensedTrace(readings, condensed, None if freedom < np.inf else 1.0, 1.0)),
-        instrument=first.instrument,
-        freedom=freedom,
-        parts=tuple(parts),
-        noise_sd=noise_sd,
-    )
+    none = np.zeros((0, len(every_s)))
+    condensed = StackedRows(first.course, every_s, none, rows=rows, noise_sd=noise_sd)
+    trace = CondensedTrace(readings, condensed, None if freedom < np.inf else 1.0, 1.0)
+    given = first.gripper, first.model, first.course, trace
+    own: dict[str, Any] = {"instrument": first.instrument, "parts": tuple(parts)}
+    return StackedResiduals(*given, **own, noise_sd=noise_sd, freedom=freedom)
 
 
 def with_free_start(problem: TraceProblem, best: Array) -> TraceProblem:
@@ -161,19 +152,16 @@ def with_free_start(problem: TraceProblem, best: Array) -> TraceProblem:
     The derivative of the response by the start, at log-parameters (n_parameters,), is projected
     out: limits then allow for it, to first order.
     """
-    residuals = problem.residuals
+    residuals, rows = problem.residuals, problem.residuals.trace.condensed
     step_s = _OF_START * spacing_at(residuals.trace.time_s, 0.0)
-    ends = [residuals.later(sign * step_s).response(best) for sign in (1, -1)]
-    rows = residuals.trace.condensed
-    by_start = rows.cleared(ends[0] - ends[1])
+    sooner, later = (residuals.later(by_s).response(best) for by_s in (-step_s, step_s))
+    by_start = rows.cleared(later - sooner)
     nuisance = np.vstack((rows.nuisance, by_start / np.linalg.norm(by_start)))
-    if rows.whitening is None:
-        rows = replace(rows, functions=nuisance)
-    else:
-        whitening = copy(rows.whitening)
+    whitening = copy(rows.whitening)
+    if whitening is not None:
         whitening.nuisance = nuisance
-        rows = replace(rows, whitening=whitening)
-    trace = replace(residuals.trace, condensed=rows, known_scatter=residuals.trace.scatter)
+    rows = replace(rows, functions=nuisance[: len(nuisance) * (whitening is None)])
+    trace = replace(residuals.trace, condensed=replace(rows, whitening=whitening))
     return replace(problem, residuals=replace(residuals, trace=trace))
 
 
@@ -206,35 +194,31 @@ class _SweptCompliance(Residuals):
         return self.trace.condensed.of_lags(rates)
 
 
-def of_one_kind(residuals: Residuals) -> tuple[Residuals, int]:
-    """Return the residuals of the traces that tell together of any linear sample, and their number.
+def of_one_kind(residuals: Residuals) -> Residuals:
+    """Return the residuals of those of several traces that tell together of any linear sample.
 
     Under a load a sample's lags add, under a deformation what they leave does, and of grippers each
     has its own. Of traces of several kinds the most are taken. A sweep is of both: to first order
     in its noise, its compliances are the inverse of its moduli.
     """
     assert isinstance(residuals, StackedResiduals)
-    pairs = [*zip(residuals.parts, residuals.noise_sd, strict=True)]
-    sweeps = [(part, sd) for part, sd in pairs if part.course.sweeps]
-    inverse = [
-        (_inverse(part), sd) for part, sd in sweeps if len({*is_storage(part.trace.time_s)}) > 1
-    ]
     kinds: dict[Any, list[tuple[Residuals, Any]]] = {}
-    for part, sd in pairs:
-        if not part.course.sweeps:
-            kinds.setdefault((part.gripper, part.course.deforms), []).append((part, sd))
-    for (_, deforms), of_kind in kinds.items():
-        jaws = of_kind[0][0].instrument.has_jaws
-        of_kind += [] if jaws else sweeps if deforms else inverse
-    parts, noise_sd = zip(*max([*kinds.values(), sweeps], key=len), strict=True)
-    return _stacked(parts, np.array(noise_sd), residuals.freedom), len(parts)
+    sweeps = [pair for pair in residuals.pairs if pair[0].course.sweeps]
+    both = [(_inverse(of), sd) for of, sd in sweeps if len({*is_storage(of.trace.time_s)}) > 1]
+    for part, sd in residuals.pairs:
+        kind = part.course.sweeps, part.gripper, part.course.deforms
+        kinds.setdefault(kind, []).append((part, sd))
+    for (swept, _, deforms), of_kind in kinds.items():
+        if not (swept or of_kind[0][0].instrument.has_jaws):
+            of_kind += sweeps if deforms else both
+    parts, noise_sd = zip(*max(kinds.values(), key=len), strict=True)
+    return _stacked(parts, np.array(noise_sd), residuals.freedom)
 
 
 def _inverse(part: Residuals) -> Residuals:
     """Return the residuals of a sweep as those of a trace under a load."""
-    rows, readings = part.trace.condensed, part.trace.readings
+    rows, trace = part.trace.condensed, part.trace
     given = rows.course, rows.all_s, rows.functions, rows.whitening
-    trace = replace(part.trace, condensed=_InverseRows(*given, readings=readings))
-    return _SweptCompliance(
-        part.gripper, part.model, part.course, trace, instrument=part.instrument
-    )
+    trace = replace(trace, condensed=_InverseRows(*given, readings=trace.readings))
+    of_part = part.gripper, part.model, part.course, trace
+    return _SweptCompliance(*of_part, instrument=part.instrument)

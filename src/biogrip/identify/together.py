@@ -14,21 +14,31 @@ import numpy as np
 
 from biogrip.digits import p_value, plain, with_limits
 from biogrip.errors import BiogripError
+from biogrip.fit.experiment import Experiment
 from biogrip.fit.joint import of_one_kind, stack, with_free_start
 from biogrip.fit.least_squares import identify_many
-from biogrip.fit.nested_fits import FittedModels
+from biogrip.fit.problem import Fit, TraceProblem
 from biogrip.identify.data import judged_data, moduli_between
 from biogrip.judging.agreement import Agreement, compare_traces, shared_freedom
 from biogrip.judging.diagnosis import Diagnosis, lower_fit, profile_all, with_notes, with_times
-from biogrip.judging.doubts import DOUBT, OK, REJECTED, REJECTION, Note, find_reasons, order_notes
+from biogrip.judging.doubts import (
+    DOUBT,
+    DOUBTFUL,
+    REJECTED,
+    REJECTION,
+    Note,
+    find_reasons,
+    order_notes,
+)
 from biogrip.judging.likelihood import Likelihood, find_thresholds
 from biogrip.judging.without_model import KINDS, WithoutModel, tell_without_model
 from biogrip.physics.protocol import largest_load
 
-# What two explanations leave open.
+# What a stiffness does, and what two explanations of that leave open.
+_WAYS = {1: "rises", -1: "falls"}
 _NOT_TOLD = ": repeat the first trace at the end to tell which"
-# Freedom of variances from which on they count as known.
-_KNOWN = 1e8
+# What the status of a trace by itself is to the joint fit.
+_WEIGHTS = {DOUBTFUL: DOUBT, REJECTED: REJECTION}
 
 
 @dataclass(frozen=True, repr=False)
@@ -50,34 +60,34 @@ class Together(Diagnosis):
 
         Of traces that do not agree it tells no more than their misfit.
         """
-        residuals, _ = of_one_kind(self.likelihood.problem.residuals)
+        residuals = of_one_kind(self.likelihood.problem.residuals)
         kinds = kinds if self.agreement.holds else ()
         confidence = self.likelihood.confidence
         return tell_without_model(residuals, confidence=confidence, at_s=at_s, kinds=kinds)
 
     def data(self) -> dict[str, Any]:
         """Return what is said of the sample and not of one trace, as plain data."""
-        agreement, rejected, experiment = self.agreement, self.status == REJECTED, self.experiment
-        assert experiment is not None
-        spread_s = self.likelihood.problem.residuals.covered_s
+        agreement, rejected, count = self.agreement, self.status == REJECTED, len(self.traces)
+        covered_s = self.likelihood.problem.residuals.covered_s
+        told: dict[str, Any] = {
+            "holds": agreement.holds,
+            "p": agreement.chance,
+            "increase": agreement.increase,
+        }
+        ratios = agreement.ratios(np.full(count, 1 / count)).tolist()
+        odd = None if agreement.odd is None else self.names[agreement.odd]
+        told |= {"degrees_of_freedom": agreement.freedom, "odd": odd, "stiffness_over_mean": ratios}
         return {
             **judged_data(self),
-            "noise_model": None,
-            **FittedModels(experiment.sample.candidate).data(rejected=rejected),
+            **{"noise_model": None, "preferred_model": None, "advice": None},
+            **{"models": [], "models_spared": []},
             "limits": "Limits are of the joint likelihood: each trace counts by its own noise.",
-            "moduli": None if rejected else moduli_between(*spread_s, self),
-            "agreement": {
-                "holds": agreement.holds,
-                "p": agreement.chance,
-                "increase": agreement.increase,
-                "degrees_of_freedom": agreement.freedom,
-                "odd": agreement.odd,
-                "stiffness_over_mean": agreement.ratios.tolist(),
-            },
+            "moduli": None if rejected else moduli_between(*covered_s, self),
+            "agreement": told,
         }
 
 
-def sample_of(names: Sequence[str], diagnoses: Sequence[Diagnosis]) -> Together:
+def identify_sample_of(names: Sequence[str], diagnoses: Sequence[Diagnosis]) -> Together:
     """Identify one sample from several traces that were identified by themselves.
 
     Parameters
@@ -93,37 +103,43 @@ def sample_of(names: Sequence[str], diagnoses: Sequence[Diagnosis]) -> Together:
         If traces have not the same sample model, fixed parameters, unit of stiffness, confidence.
     """
     experiments = [diagnosis.identified[1] for diagnosis in diagnoses]
-    for what in ("sample", "fixed", "confidence"):
-        every = [getattr(experiment, what) for experiment in experiments]
-        for name, value in zip(names, every, strict=True):
-            if value != every[0]:
-                text = f"{name}: found another {what} than of {names[0]}, {value} and {every[0]}"
+    first = experiments[0]
+    for name, other in zip(names, experiments, strict=True):
+        for what in ("sample", "fixed", "confidence"):
+            if (found := getattr(other, what)) != (given := getattr(first, what)):
+                text = f"{name}: found another {what} than of {names[0]}, {found} and {given}"
                 raise BiogripError(f"{text}; allowed is one for all traces of a sample.")
-    singles = [_single(diagnosis) for diagnosis in diagnoses]
-    problem = stack([one.problem for one in singles], np.array([one.noise_sd for one in singles]))
-    for number, one in enumerate(singles):
-        within = replace(one.problem, low=problem.low, high=problem.high)
-        singles[number] = replace(one, problem=within)
-    rng, starts = experiments[0].stream("together"), np.array([one.best for one in singles])
-    (fit,) = identify_many([problem], experiments[0].least_squares, [rng], further=[starts])
-    while True:
-        likelihood = _joint(np.log(fit.parameters), fit.misfit, singles)
-        (judged,) = profile_all([likelihood])
-        lower = lower_fit(judged, fit)
-        if lower is None:
-            break
-        fit = lower
-    agreement = compare_traces(likelihood, singles)
-    notes = [*_notes_on_traces(names, diagnoses)]
+    singles = [_with_free_start(diagnosis) for diagnosis in diagnoses]
+    parts, noise_sd = [one.problem for one in singles], np.array([one.noise_sd for one in singles])
+    problem, starts = stack(parts, noise_sd), np.array([one.best for one in singles])
+    ends = problem.low, problem.high
+    parts = [TraceProblem(part.residuals, *ends, part.ranges) for part in parts]
+    singles = [replace(one, problem=part) for one, part in zip(singles, parts, strict=True)]
+    rngs = [first.stream("together")]
+    (best_fit,) = identify_many([problem], first.least_squares, rngs, further=[starts])
+    freedom = shared_freedom(np.log(best_fit.parameters), singles)
+    problem, thresholds = (
+        stack(parts, noise_sd, freedom),
+        find_thresholds(first.confidence, freedom),
+    )
+    lower: Fit | None = best_fit
+    while lower is not None:
+        best_fit, best = lower, np.log(lower.parameters)
+        given = problem, best, best_fit.misfit, 1.0, *thresholds, freedom, first.confidence
+        (judged,) = profile_all([likelihood := Likelihood(*given)])
+        lower = lower_fit(judged, best_fit)
+    agreement, notes = compare_traces(likelihood, singles), list[Note]()
     if not agreement.holds:
         notes.append(Note(REJECTION, _differences(names, diagnoses, agreement)))
-    judged = with_notes(replace(judged, converged=fit.converged), notes)
-    (judged,) = with_times([judged])
-    given = {**vars(judged), "experiment": experiments[0]}
-    return Together(**given, names=tuple(names), traces=tuple(diagnoses), agreement=agreement)
+    for name, one in zip(names, diagnoses, strict=True):
+        weight, why = _WEIGHTS.get(one.status), " ".join(find_reasons(order_notes(one.notes)))
+        notes += [Note(weight, f"{name}, by itself {one.status}: {why}")] if weight else []
+    judged = with_notes(replace(judged, converged=best_fit.converged), notes)
+    of_joint = {**vars(with_times([judged])[0]), "experiment": first}
+    return Together(**of_joint, names=tuple(names), traces=tuple(diagnoses), agreement=agreement)
 
 
-def _single(diagnosis: Diagnosis) -> Likelihood:
+def _with_free_start(diagnosis: Diagnosis) -> Likelihood:
     """Return the likelihood of a trace, with a free start if that was fitted along."""
     likelihood = diagnosis.likelihood
     if not diagnosis.identified[1].fit_start:
@@ -131,57 +147,27 @@ def _single(diagnosis: Diagnosis) -> Likelihood:
     return replace(likelihood, problem=with_free_start(likelihood.problem, likelihood.best))
 
 
-def _joint(best: Any, misfit: float, singles: Sequence[Likelihood]) -> Likelihood:
-    """Return the joint likelihood, with thresholds for noise that is known as well as it is."""
-    noise_sd, confidence = np.array([one.noise_sd for one in singles]), singles[0].confidence
-    freedom = shared_freedom(best, singles)
-    freedom = freedom if freedom < _KNOWN else np.inf
-    problem = stack([one.problem for one in singles], noise_sd, freedom)
-    thresholds = find_thresholds(confidence, freedom)
-    return Likelihood(problem, best, misfit, 1.0, *thresholds, freedom, confidence)
-
-
-def _notes_on_traces(names: Sequence[str], diagnoses: Sequence[Diagnosis]) -> list[Note]:
-    """Return doubts about the joint fit by the status of each trace's own."""
-    return [
-        Note(
-            REJECTION if diagnosis.status == REJECTED else DOUBT,
-            f"{name}, by itself {diagnosis.status}: "
-            f"{' '.join(find_reasons(order_notes(diagnosis.notes)))}",
-        )
-        for name, diagnosis in zip(names, diagnoses, strict=True)
-        if diagnosis.status != OK
-    ]
-
-
 def _differences(names: Sequence[str], diagnoses: Sequence[Diagnosis], agreement: Agreement) -> str:
     """Say that traces do not agree, which differs, and whether that follows load or order."""
     rise = f"χ² rises by {plain(agreement.increase)} with {agreement.freedom} degrees of freedom"
     said = f"The traces are not of one linear sample ({p_value(agreement.chance)}; {rise}). "
-    told = [
-        f"{name} {with_limits(*ratio)} times"
-        for name, ratio in zip(names[1:], agreement.to_first[1:], strict=True)
-    ]
-    said += f"As stiff as {names[0]}: {', '.join(told)}. "
+    ratios = zip(names, agreement.ratios(np.eye(len(names))[0]), strict=True)
+    told = [f"{with_limits(*ratio)} of {name}" for name, ratio in ratios]
+    said += f"The stiffness, over that of {names[0]}, is {' and '.join(told[1:])}. "
     if agreement.odd is not None:
         said += f"Without {names[agreement.odd]} the others agree. "
     if not agreement.in_stiffness:
         said += "They differ in more than stiffness, as in times or shape. "
-    ways = [*_ways(diagnoses, agreement)]
-    if not ways:
-        return f"{said}The differences follow neither load nor order."
-    return f"{said}Stiffness {' and '.join(ways)}{_NOT_TOLD if len(ways) > 1 else ''}."
+    ways = [*_ways([diagnosis.identified[1] for diagnosis in diagnoses], agreement)]
+    told_apart = _NOT_TOLD if len(ways) > 1 else ""
+    return f"{said}It {' and '.join(ways) or 'follows neither load nor order'}{told_apart}."
 
 
-def _ways(diagnoses: Sequence[Diagnosis], agreement: Agreement) -> Iterator[str]:
-    """Yield clauses on what the ratio of stiffness rises or falls with."""
-    experiments = [diagnosis.identified[1] for diagnosis in diagnoses]
-    controlled = {one.instrument.controlled.name for one in experiments}
-    loads = [abs(largest_load(one.phases)) for one in experiments]
-    if len(controlled) == 1 and not experiments[0].instrument.sweeps:
-        way = agreement.rises_with(loads)
-        if way:
-            words = "rises with the {} (stiffening)" if way > 0 else "falls with the {} (softening)"
-            yield words.format(*controlled)
+def _ways(experiments: Sequence[Experiment], agreement: Agreement) -> Iterator[str]:
+    """Yield what the ratio of stiffness does, as far as it follows load or order."""
+    first, loads = experiments[0].instrument, [largest_load(one.phases) for one in experiments]
+    same = {one.instrument.controlled for one in experiments} == {first.controlled}
+    if same and not first.sweeps and (way := agreement.rises_with(np.abs(loads).tolist())):
+        yield f"{_WAYS[way]} with the {first.controlled.name}"
     if way := agreement.rises_with(range(len(loads))):
-        yield f"{'rises' if way > 0 else 'falls'} in the order of the traces (ageing or damage)"
+        yield f"{_WAYS[way]} in the order of the traces"
