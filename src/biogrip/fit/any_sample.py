@@ -109,7 +109,8 @@ def show_lags(residuals: Residuals, covered_s: tuple[float, float], more: Array)
     rows /= residuals.noise_scale
     sizes = np.maximum(np.linalg.norm(rows, axis=1), _NOTHING)
     # A slow lag yields in proportion to its rate, and a fast one resists in inverse proportion.
-    clear = sizes * (1 + (places if deforms else 1 / places))
+    fast = covered_s[0] * rates if residuals.parts else places
+    clear = sizes * (1 + (fast if deforms else 1 / places))
     clear /= clear.max()
     rows[clear < _UNSEEN] = 0.0
     return Lags(residuals, covered_s, rates, rows / sizes[:, None], sizes, clear < _FAINT)

@@ -2,7 +2,7 @@
 
 Each trace is divided by its noise, whose standard deviation is known with some degrees of freedom.
 What its instrument may have added, an offset, a drift, a contact, stays its own: it is projected
-out of its own rows (`Condensed`), and so is, to first order, a start that is fitted along.
+out of its own rows (`Condensed`). Of a start that is fitted along these allow to first order.
 """
 
 from collections.abc import Iterator, Sequence
@@ -16,7 +16,7 @@ from biogrip.arrays import Array
 from biogrip.fit.problem import TraceProblem
 from biogrip.physics.condensed import Condensed, SweptRows
 from biogrip.physics.modes import Modes, compute_modes
-from biogrip.physics.noise import moduli_of, places_of
+from biogrip.physics.noise import moduli_of, places_of, with_uncertain
 from biogrip.physics.protocol import is_storage, spacing_at
 from biogrip.physics.residuals import CondensedTrace, Residuals
 from biogrip.physics.sample_model import Network
@@ -146,17 +146,17 @@ def _stacked(parts: Sequence[Residuals], noise_sd: Array, freedom: float) -> Sta
     return StackedResiduals(*given, **own, noise_sd=noise_sd, freedom=freedom)
 
 
-def with_free_start(problem: TraceProblem, best: Array) -> TraceProblem:
-    """Return a problem whose protocol may start a little sooner or later than at its best fit.
+def with_uncertain_start(problem: TraceProblem, best: Array, start_sd: float) -> TraceProblem:
+    """Return a problem whose protocol may start sooner or later than at its best fit.
 
-    The derivative of the response by the start, at log-parameters (n_parameters,), is projected
-    out: limits then allow for it, to first order.
+    The derivative of the response by the start, at log-parameters (n_parameters,), is added with a
+    random amplitude (`with_uncertain`), whose standard deviation is in s: limits allow for it.
     """
     residuals, rows = problem.residuals, problem.residuals.trace.condensed
     step_s = _OF_START * spacing_at(residuals.trace.time_s, 0.0)
     sooner, later = (residuals.later(by_s).response(best) for by_s in (-step_s, step_s))
-    by_start = rows.cleared(later - sooner)
-    nuisance = np.vstack((rows.nuisance, by_start / np.linalg.norm(by_start)))
+    by_start = start_sd / residuals.noise_scale * rows.cleared(later - sooner) / (2 * step_s)
+    nuisance = with_uncertain(rows.nuisance, by_start[None])
     whitening = copy(rows.whitening)
     if whitening is not None:
         whitening.nuisance = nuisance

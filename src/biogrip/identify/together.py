@@ -15,7 +15,7 @@ import numpy as np
 from biogrip.digits import p_value, plain, with_limits
 from biogrip.errors import BiogripError
 from biogrip.fit.experiment import Experiment
-from biogrip.fit.joint import of_one_kind, stack, with_free_start
+from biogrip.fit.joint import of_one_kind, stack, with_uncertain_start
 from biogrip.fit.least_squares import identify_many
 from biogrip.fit.problem import Fit, TraceProblem
 from biogrip.identify.data import judged_data, moduli_between
@@ -109,7 +109,7 @@ def identify_sample_of(names: Sequence[str], diagnoses: Sequence[Diagnosis]) -> 
             if (found := getattr(other, what)) != (given := getattr(first, what)):
                 text = f"{name}: found another {what} than of {names[0]}, {found} and {given}"
                 raise BiogripError(f"{text}; allowed is one for all traces of a sample.")
-    singles = [_with_free_start(diagnosis) for diagnosis in diagnoses]
+    singles = [_with_start(diagnosis) for diagnosis in diagnoses]
     parts, noise_sd = [one.problem for one in singles], np.array([one.noise_sd for one in singles])
     problem, starts = stack(parts, noise_sd), np.array([one.best for one in singles])
     ends = problem.low, problem.high
@@ -139,12 +139,17 @@ def identify_sample_of(names: Sequence[str], diagnoses: Sequence[Diagnosis]) -> 
     return Together(**of_joint, names=tuple(names), traces=tuple(diagnoses), agreement=agreement)
 
 
-def _with_free_start(diagnosis: Diagnosis) -> Likelihood:
-    """Return the likelihood of a trace, with a free start if that was fitted along."""
-    likelihood = diagnosis.likelihood
-    if not diagnosis.identified[1].fit_start:
+def _with_start(diagnosis: Diagnosis) -> Likelihood:
+    """Return the likelihood of a trace that allows for its start, if that was fitted along.
+
+    Half the width of the start's limits counts as a standard deviation: twice what they tell, as
+    they follow in part from what the trace tells of the sample.
+    """
+    likelihood, ends_s = diagnosis.likelihood, diagnosis.onset_limits_s
+    if ends_s is None:
         return likelihood
-    return replace(likelihood, problem=with_free_start(likelihood.problem, likelihood.best))
+    given = likelihood.problem, likelihood.best, (ends_s[1] - ends_s[0]) / 2
+    return replace(likelihood, problem=with_uncertain_start(*given))
 
 
 def _differences(names: Sequence[str], diagnoses: Sequence[Diagnosis], agreement: Agreement) -> str:

@@ -188,10 +188,11 @@ def _fit_ratios(joint: Likelihood, singles: Sequence[Likelihood]) -> tuple[Array
     from scipy.optimize import least_squares
 
     parts, count = [single.problem.residuals for single in singles], len(joint.best)
+    low, high = joint.problem.low, joint.problem.high
     stiff = np.array([p.kind in _STIFF for p in parts[0].model.parameters], float)
 
     def rows(z: Array) -> Array:
-        at = [(z[:count] + stiff * ratio)[None] for ratio in (0.0, *z[count:])]
+        at = [np.clip(z[:count] + stiff * ratio, low, high)[None] for ratio in (0.0, *z[count:])]
         shown = [
             part.condensed_responses(x, slopes=False)[0, 0]
             for part, x in zip(parts, at, strict=True)
