@@ -162,6 +162,8 @@ def _add_settings(parser: Any) -> None:
         help="CSV file with a header; or a table of traces: column file has their names, columns "
         "named like keys of the config set these, others are copied to --csv",
     )
+    text = "all traces are of one sample, which they tell together (a table: column sample)"
+    parser.add_argument("--together", action="store_true", help=text)
     for title, options in GROUPS.items():
         group = parser.add_argument_group(title)
         for name, metavar, key, text in options:

@@ -173,6 +173,16 @@ OF_THE_FASTEST = 1e4
 WORTH_SAYING = 0.005
 """Share of the noise's variance that is said: half of the percent that it is rounded to."""
 
+# Several traces of one sample.
+
+ONE_SAMPLE = 0.01
+"""Level at which traces are not of one sample, for both tests together: it rejects a joint fit, of
+which one in a hundred right ones is lost; each trace's own result stays."""
+
+TELLS = 0.1
+"""Information on a combination of log-parameters, in squares of e-folds, from which on a fit adapts
+it, and it counts as a degree of freedom: standard deviations of three e-folds. Chosen."""
+
 # Other models, and instruments.
 
 WORTH_A_MENTION, STRONG = 2.0, 6.0

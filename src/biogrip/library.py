@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from threadpoolctl import threadpool_limits
 
 from biogrip.arrays import Array, as_column
-from biogrip.command.files import data_of
+from biogrip.command.files import data_of, sample_of
 from biogrip.command.options import Setting
 from biogrip.command.outputs import Outcome, table_of
 from biogrip.command.settings import MODEL, Asked, read_trace
@@ -117,7 +117,8 @@ class TraceResult:
 
     def refit(self, **changed: Any) -> "TraceResult":
         """Identify the trace again with some other arguments, as ``model="sls"``."""
-        return identify_trace(**{**self.arguments, **changed})
+        again = identify_together if "traces" in self.arguments else identify_trace
+        return again(**{**self.arguments, **changed})
 
     def plot(self, what: str = "fit") -> "Figure":
         """Draw the trace, its fit and the residuals, or instead the ``"profiles"``."""
@@ -248,6 +249,34 @@ def identify_trace(
     return TraceResult(diagnosis, _with_arguments(data), arguments)
 
 
+@one_blas_thread
+def identify_together(
+    traces: Mapping[str, Mapping[str, Any]] | Iterable[Mapping[str, Any]], **shared: Any
+) -> TraceResult:
+    """Identify one sample from several traces, and test whether they are of one sample.
+
+    Parameters
+    ----------
+    traces
+        Arguments of `identify_trace` of each, by name or numbered: creep, relaxation, sweeps and
+        grippers may be mixed where the stiffness has one unit.
+    shared
+        Arguments that all have, as ``model="sls"``.
+
+    Raises
+    ------
+    BiogripError
+        If a trace cannot be used, or they have not one model, unit of stiffness and confidence.
+    """
+    given = traces
+    if not isinstance(given, Mapping):
+        given = {f"trace {number}": arguments for number, arguments in enumerate(given, start=1)}
+    results = {name: identify_trace(**{**shared, **own}) for name, own in given.items()}
+    said = {name: (one.diagnosis, {**one.data, "trace": name}) for name, one in results.items()}
+    sample, data = sample_of("sample", said)
+    return TraceResult(sample, _with_arguments(data), {"traces": given, **shared})
+
+
 def to_table(
     results: Mapping[str, TraceResult] | Iterable[TraceResult],
     words: Mapping[str, Mapping[str, str]] | None = None,
@@ -365,6 +394,7 @@ __all__ = [
     "add_noise",
     "hold",
     "identify_sample",
+    "identify_together",
     "identify_trace",
     "set_up",
     "simulate",

@@ -25,6 +25,7 @@ _LINES = 5
 _MOST_NAMED = 5
 # Share of a quantity below which no error of the instrument is worth a line.
 _LEAST_MOVE = 1e-4
+_LIKELIHOOD_RATIO = "That they are of one sample was tested by likelihood ratios."
 _NUMBER = re.compile(r"\d[\d.e+-]*")
 # What the notes of a weight do to the fit.
 _MEANS = {
@@ -56,14 +57,22 @@ def in_words(found: Mapping[str, Any]) -> str:
     lines += [f"Note: {visible(text)}" for text in further_notes(found)]
     lines += [found["advice"]] if found["advice"] else []
     lines += [taken_for_granted(found)] if found["by_default"] else []
+    if traces := found.get("traces"):
+        lines += ["Each trace by itself:", in_columns(traces, {})]
+        lines += [f"{visible(each['trace'])}: {it}" for each in traces for it in terms_of(each)]
     return "\n".join(lines)
+
+
+def terms_of(found: Mapping[str, Any]) -> list[str]:
+    """Return lines on the noise of a trace, and on what of its instrument was fitted along."""
+    return [misfit_in_words(found), *fitted_in_words(found)[len(given_in_words(found)) :]]
 
 
 def without_model_in_words(found: Mapping[str, Any]) -> list[str]:
     """Return lines on what any linear sample would show."""
     own, told = found["without_model"], foremost(found)
     left = f"{plain(own['times_noise'], 2)} times the noise"
-    if found["instrument"] != _SWEEPS:
+    if not _by_noise(found):
         left = f"{in_unit(own['misfit_rad'], found)}, {left}"
     if not told:
         return [f"No linear sample fits, whatever its model: the least misfit is {left}."]
@@ -121,15 +130,22 @@ def foremost(found: Mapping[str, Any]) -> list[Mapping[str, Any]]:
 def misfit_in_words(found: Mapping[str, Any]) -> str:
     """Return the number of readings, their noise, and the misfit of the best fit."""
     said, noise = f"{found['samples']} readings", noise_in_words(found)
-    if found["instrument"] != _SWEEPS:
+    if not _by_noise(found):
         noise = f"{noise} {in_unit(found['scatter_rad'], found)}"
         return f"{said}, {noise}, misfit (RMS) {in_unit(found['misfit_rad'], found)}"
     ratio = plain(found["misfit_rad"] / found["scatter_rad"], 2)
     return f"{said}, misfit {ratio} times the {noise}"
 
 
+def _by_noise(found: Mapping[str, Any]) -> bool:
+    """Return True if misfits are told over the noise: those of several traces are, too."""
+    return found["instrument"] == _SWEEPS or "traces" in found
+
+
 def noise_in_words(found: Mapping[str, Any]) -> str:
     """Return the noise that a misfit is held against: given, modelled, or seen in the trace."""
+    if "traces" in found:
+        return f"noise of each of {len(found['traces'])} traces"
     if found["fit"] == REJECTED and found["noise_model"]:
         return "noise that cannot be told from misfit"
     given = found["assumed"]["measurement"]
@@ -331,6 +347,9 @@ _MOST_PHASES, _MOST_REFUSED = 4, 3
 
 def set_up_in_words(found: Mapping[str, Any]) -> list[str]:
     """Return sentences on instrument, protocol, model, noise, limits and conditions of a trace."""
+    if traces := found.get("traces"):
+        text = f"{len(traces)} traces of a sample were fitted together, each over its own noise."
+        return [*together(map(set_up_in_words, traces)), text, _LIKELIHOOD_RATIO]
     instrument, assumed = INSTRUMENTS[found["reads"]["quantity"]], found["assumed"]
     under = "" if instrument.sweeps else f" under {_protocol(found)}"
     said = [f"{instrument.in_words}{under}."]

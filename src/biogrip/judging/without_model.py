@@ -196,7 +196,7 @@ def tell_without_model(
         # It leaves nothing that tells the noise.
         sd = max(sd, residuals.noise_scale)
     is_linear = chance >= levels.CERTAIN_MISFIT or times <= levels.TOO_MUCH
-    if not is_linear:
+    if not is_linear and kinds:
         independent, freedom = as_correlated(*left)
         sd = fit.sd * math.sqrt(free / independent)
     root = partial(_root, confidence, freedom, float(sd / residuals.noise_scale))
