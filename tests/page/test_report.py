@@ -14,6 +14,7 @@ from biogrip_study.page import answers
 from biogrip_study.page.page import entry_of, write_report
 from biogrip_study.records.identifications import read_verdicts
 from tests.helpers.browser import Opened
+from tests.helpers.links import links_of
 from tests.helpers.places import ROOT
 from tests.helpers.problems import MODEL, rotation
 from tests.helpers.runs import TINY
@@ -32,18 +33,24 @@ def opened(browser: Any, report: Path) -> Iterator[Opened]:
     page.close()
 
 
-def test_the_page_needs_nothing_else_and_links_its_files(opened: Opened, report: Path) -> None:
+def test_the_page_needs_nothing_else(opened: Opened, report: Path) -> None:
     assert report.stat().st_size < 8_000_000
     told = "['width', 'height'].map(name => +it.getAttribute(name))"
     of_image = f"all => all.map(it => [[it.naturalWidth, it.naturalHeight], {told}])"
     sizes = opened.page.locator("img").evaluate_all(of_image)
     assert len(sizes) > 10
     assert all(natural == told and min(told) > 0 for natural, told in sizes)
-    text = report.read_text("utf-8")
-    link = r'<p class="made">File <a href="([\w./-]+)"><code>results/\1</code></a></p>'
-    files = re.findall(link, text)
-    assert len(files) == text.count('<p class="made">') > 30
-    assert [file for file in files if not (report.parent / file).is_file()] == []
+
+
+@pytest.mark.parametrize("published", [False, True])
+def test_every_link_of_a_page_leads_somewhere(report: Path, published: bool) -> None:
+    pages = [*(ROOT / "results" / "published").rglob("*.html")] if published else [report]
+    pages += [] if published else [*report.parent.glob("summaries/*.html")]
+    assert pages
+    for page in pages:
+        links, dead = links_of(page)
+        assert dead == []
+        assert len(links) > 5 or page.parent.name == "summaries"
 
 
 SMALLEST_LETTERS = """Math.min(...[...document.querySelectorAll('p, li, td, dd, figcaption')]

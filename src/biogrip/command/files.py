@@ -292,16 +292,12 @@ def _diagnosed(
         few = len(recording.time_s) * _MOST_IN_BATCH <= _MOST_READINGS
         alike[budget(experiment), None if few else index].append(index)
 
-    def doing(step: str) -> None:
-        progress.done()
-        progress.doing(step)
-
     groups = [*alike.values()]
     for group in groups:
         traces, failed = [read[index][1] for index in group], dict[str, str]()
         diagnoses: list[Diagnosis] = []
         with _caught(asked[group[0]], failed):
-            diagnoses = identify_alike(traces, progress=progress.within, doing=doing)
+            diagnoses = identify_alike(traces, progress.within, progress.doing)
         yield from zip(group, diagnoses, strict=False)
         # An error is of one of a group: it is then identified one by one.
         if failed and len(group) > 1:

@@ -65,6 +65,8 @@ def without_model_in_words(found: Mapping[str, Any]) -> list[str]:
     left = f"{plain(own['times_noise'], 2)} times the noise"
     if found["instrument"] != _SWEEPS:
         left = f"{in_unit(own['misfit_rad'], found)}, {left}"
+    if not told and own["times_noise"] < 1:
+        return ["With so large a noise the trace tells nothing of any linear sample."]
     if not told:
         return [f"No linear sample fits, whatever its model: the least misfit is {left}."]
     width = max(len(each["quantity"]) for each in told)
@@ -366,11 +368,8 @@ def preferred_in_words(found: Mapping[str, Any]) -> list[str]:
     if not found["preferred_model"]:
         return []
     lowest = min(found["models"], key=lambda row: row["delta_bic"])
-    count = len(found["models"]) + len(found["models_spared"])
-    return [
-        f"Of {count} models that were compared, that of the lowest BIC is another: "
-        f"{lowest['title']}."
-    ]
+    count = len(found["models"])
+    return [f"Of {count} models that were fitted, another has the lowest BIC: {lowest['title']}."]
 
 
 def _protocol(found: Mapping[str, Any]) -> str:
