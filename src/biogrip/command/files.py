@@ -7,11 +7,12 @@ killed, costs no other its result, and what is done is not done again.
 import os
 import sys
 import traceback
+from base64 import b64decode
 from collections import defaultdict
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
-from multiprocessing import get_context
+from multiprocessing import get_all_start_methods, get_context
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any, TypeVar
@@ -34,7 +35,7 @@ from biogrip.command.words import in_columns, in_words
 from biogrip.config.case import SampleCase
 from biogrip.config.loading import trace_defaults
 from biogrip.errors import BiogripError
-from biogrip.files import digest_of, software
+from biogrip.files import atomic_write, digest_of, software
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.problem import SearchRange
 from biogrip.identify.data import trace_data
@@ -69,13 +70,15 @@ def identify_files(
     output: Path | None = None,
     report: Path | None = None,
     table: Path | None = None,
+    plot: Path | None = None,
     rows: tuple[int, int] | None = None,
 ) -> int:
     """Identify traces and tables of traces, write the results, and print them.
 
     Config and settings are those of all traces. `output` is the JSON file of a single trace, by
-    default one beside each; `report` and `table` are HTML and CSV files to write, if any. `rows`
-    are the first and last row of a table to identify, from 0, without JSON files; by default all.
+    default one beside each; `report`, `table` and `plot` are HTML, CSV and PNG files, if any.
+    `rows` are the first and last row of a table to identify, from 0, without JSON files; by default
+    all.
 
     Return 1 if any of several traces could not be used. A `BiogripError` says that an option, the
     config or the only trace cannot.
@@ -95,13 +98,16 @@ def identify_files(
         raise BiogripError(absent[str(files[0])])
     if output is not None and not alone:
         raise BiogripError("--output: only for one trace; each of several gets its own file.")
+    if plot is not None and not (alone and plot.suffix == ".png"):
+        text = f"found {visible(plot)}; allowed is a name that ends with .png, of one trace."
+        raise BiogripError(f"--plot: {text} For several there is --report.")
     # Errors of options and config concern all traces: they are raised once, here.
     check_settings(every)
     outputs = [output or own.output for own in every] if rows is None else []
     names = [own.name for own in every]
     written = [*zip(names, outputs, strict=False), ("--report", report), ("--csv", table)]
     check_outputs(written, [*files, *(own.trace for own in every), *filter(None, [config])])
-    drawn = report is not None and len(every) <= MOST_DRAWN
+    drawn = bool(report or plot) and len(every) <= MOST_DRAWN
     outcome = _identify_traces(every, outputs or None, drawn=drawn)
     if alone and outcome.refused:
         raise BiogripError(outcome.refused[str(files[0])])
@@ -113,10 +119,14 @@ def identify_files(
         from biogrip.command.page import write_page
 
         write_page(outcome, report)
+    for fit, *_ in outcome.pictures.values():
+        if plot is not None:
+            with atomic_write(plot) as scratch:
+                scratch.write_bytes(b64decode(fit.partition(",")[2]))
     print(in_words(outcome.found[0]) if alone else in_columns(outcome.found, outcome.refused))
     pairs = zip(every, outputs, strict=False)
     made = [path for own, path in pairs if own.name not in outcome.refused]
-    if said := [visible(path) for path in (*made, report, table) if path]:
+    if said := [visible(path) for path in (*made, report, table, plot) if path]:
         print(f"Written to {', '.join(said)}.")
     return 1 if outcome.refused else 0
 
@@ -153,7 +163,7 @@ def _identify_traces(
         text = f"{len(found)} of {len(asked)} traces are taken from their JSON files, as they and"
         print(f"{text} what is asked have not changed.", file=sys.stderr)
     left = [number for number, own in enumerate(asked) if own.name not in found]
-    processors = len(os.sched_getaffinity(0))
+    processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 2
     size = max(1, min(_MOST_IN_BATCH, -(-len(left) // processors)))
     batches = [left[start : start + size] for start in range(0, len(left), size)]
     every = Outcome([], {})
@@ -191,6 +201,9 @@ def side_by_side(work: Callable[[J], T], jobs: Sequence[J], most: int) -> Iterat
     there at once; they are forked, and end when this one does, however that ends. An error that
     work raises is raised here.
     """
+    if "fork" not in get_all_start_methods():  # on Windows
+        yield from map(work, jobs)
+        return
     fork, parent = get_context("fork"), os.getpid()
     running: dict[Any, tuple[int, Any]] = {}
     done: dict[int, T | None] = {}

@@ -26,12 +26,12 @@ _MOST_NAMED = 5
 # Share of a quantity below which no error of the instrument is worth a line.
 _LEAST_MOVE = 1e-4
 _NUMBER = re.compile(r"\d[\d.e+-]*")
-# What the notes of a weight do to the fit.
-_MEANS = {
+MEANS = {
     OK: "the residuals look like noise",
     DOUBTFUL: "trust the limits only if you can rule out the reasons given",
     REJECTED: "the model cannot give this trace, so that it has no limits",
 }
+"""What a status of a fit means."""
 _SAID = {HARMLESS: "note", DOUBT: DOUBTFUL, REJECTION: REJECTED}
 
 
@@ -40,7 +40,7 @@ def in_words(found: Mapping[str, Any]) -> str:
     width = max(len(item["quantity"]) for item in found["quantities"])
     rejected = found["fit"] == REJECTED
     lines = [
-        f"{visible(found['trace'])}: fit {found['fit']}: {_MEANS[found['fit']]}.",
+        f"{visible(found['trace'])}: fit {found['fit']}: {MEANS[found['fit']]}.",
         *(f"  {visible(reason)}" for reason in found["reasons"]),
         misfit_in_words(found),
         *(without_model_in_words(found) if rejected else []),
@@ -233,7 +233,7 @@ def in_columns(found: Sequence[Mapping[str, Any]], refused: Mapping[str, str]) -
         lines.append(aligned(rows, ["trace", "fit", *columns.values()]))
         lines.append(f"{100 * found[0]['confidence']:g} % limits; ? where the trace tells nothing.")
         fits = {each["fit"] for each in found}
-        lines += [f"Fit {fit}: {means}." for fit, means in _MEANS.items() if fit in fits]
+        lines += [f"Fit {fit}: {means}." for fit, means in MEANS.items() if fit in fits]
         lines += [*one_sided_in_words(found), *_once(found, lambda each: [each["limits"]])]
         lines += _once(found, _provided)
         lines += _once(found, given_in_words)

@@ -219,9 +219,7 @@ def with_times(diagnoses: Sequence[Diagnosis]) -> list[Diagnosis]:
     every = compute_findings(likelihoods, times)
     pairs = zip(diagnoses, every, strict=True)
     return [
-        replace(
-            own, findings=[*(_unconditional(each, more, own) for each in own.findings), *more]
-        )
+        replace(own, findings=[*(_unconditional(each, more, own) for each in own.findings), *more])
         for own, more in pairs
     ]
 
