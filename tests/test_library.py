@@ -1,3 +1,5 @@
+import ast
+import json
 import re
 from base64 import b64decode
 from io import BytesIO
@@ -10,6 +12,7 @@ import pandas as pd
 import PIL.Image
 import pytest
 import yaml
+from matplotlib.figure import Figure
 
 import biogrip
 from biogrip import library
@@ -221,3 +224,25 @@ def test_a_notebook_shows_status_table_and_picture() -> None:
     rows = re.findall("<th>([^<]+)</th>\n      <td>", shown)
     assert rows == ["k", "k_p", "c", "c_p", "c + c_p", "tau"]
     assert "model: fit ok</p>" in shown
+
+
+def test_the_notebook_says_what_it_shows(capsys: pytest.CaptureFixture[str]) -> None:
+    cells = json.loads((ROOT / "docs" / "notebook.ipynb").read_text(encoding="utf-8"))["cells"]
+    names: dict[str, Any] = {}
+    shown = 0
+    for cell in (it for it in cells if it["cell_type"] == "code"):
+        source = "".join(cell["source"])
+        last = ast.parse(source).body[-1]
+        exec(compile(source, "notebook", "exec"), names)
+        said = capsys.readouterr().out
+        for output in cell["outputs"]:
+            if output["output_type"] == "execute_result":
+                assert isinstance(last, ast.Expr)
+                value = eval(ast.unparse(last), names)
+                assert isinstance(value, Figure) or repr(value) == "".join(
+                    output["data"]["text/plain"]
+                )
+            else:
+                assert said == "".join(output["text"])
+            shown += 1
+    assert shown == 4

@@ -32,7 +32,7 @@ from tests.helpers.problems import clean
 
 
 def test_the_example_gives_its_truth() -> None:
-    """What is printed of its quantities stands in README.md."""
+    """What is printed of it stands in the tutorial."""
     said, found = example()
     quantities = by_quantity(found)
     truth = yaml.safe_load(EXAMPLE_TRUTH.read_text())["cases"]["example"]["sample"]

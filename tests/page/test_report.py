@@ -84,10 +84,14 @@ def test_the_page_answers_first_and_from_its_tables(opened: Opened, report: Path
     titles, who = {"liquid_drop_2": "Liquid drop, case 2"}, "Run again, the paper's"
     page, own = opened.page, "genetic algorithm"
     assert page.locator("h1 + .split .answers p:not(.soft)").all_text_contents() == [
-        answers.say_what_traces_tell(read_table(tables / "coverage.csv"), titles).replace("_", ""),
         legible(answers.say_what_the_study_gives(compared, own, titles, who, 1.0)),
         legible(answers.say_which_method_finds_it(compared, own)),
     ]
+    table = page.locator("h1 + .split .answers .share")
+    counts = read_table(tables / "coverage.csv")
+    expected = [f"{row['shown_determined']} of {row['shown_seeds']}" for row in counts]
+    assert [" ".join(it.split()[1:]) for it in table.locator("td").all_inner_texts()] == expected
+    assert table.evaluate("it => it.getBoundingClientRect().bottom") < 900
     told = page.locator("#tables summary").all_text_contents()
     captions = [text.split(". ", 1)[1] for text in map(str.strip, told) if ". " in text]
     assert len(captions) == len(set(captions)) > 5

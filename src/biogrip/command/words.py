@@ -6,6 +6,7 @@ from math import log
 from textwrap import indent
 from typing import Any
 
+import biogrip.levels as levels
 from biogrip import __version__
 from biogrip.digits import counted, instant, legible, plain, with_limits, with_unit, within_limits
 from biogrip.judging.doubts import DOUBT, DOUBTFUL, HARMLESS, OK, REJECTED, REJECTION
@@ -66,12 +67,15 @@ def without_model_in_words(found: Mapping[str, Any]) -> list[str]:
     if found["instrument"] != _SWEEPS:
         left = f"{in_unit(own['misfit_rad'], found)}, {left}"
     if not told and own["times_noise"] < 1:
-        return ["With so large a noise the trace tells nothing of any linear sample."]
+        return ["Model-free: with so large a noise the trace tells nothing."]
     if not told:
-        return [f"No linear sample fits, whatever its model: the least misfit is {left}."]
+        return [
+            f"Model-free: no linear viscoelastic sample fits; the least RMS residual is {left}."
+        ]
     width = max(len(each["quantity"]) for each in told)
     lines = (f"  {each['quantity']:<{width}}  {each['in_words']}" for each in told)
-    return [f"Any linear sample that fits, whatever its model (least misfit {left}), has:", *lines]
+    any_sample = "Model-free, any linear viscoelastic sample that fits"
+    return [f"{any_sample} (least RMS residual {left}), has:", *lines]
 
 
 def rows_of_moves(found: Mapping[str, Any]) -> list[tuple[str, dict[str, float]]]:
@@ -125,9 +129,11 @@ def misfit_in_words(found: Mapping[str, Any]) -> str:
     said, noise = f"{found['samples']} readings", noise_in_words(found)
     if found["instrument"] != _SWEEPS:
         noise = f"{noise} {in_unit(found['scatter_rad'], found)}"
-        return f"{said}, {noise}, misfit (RMS) {in_unit(found['misfit_rad'], found)}"
+        few = found["misfit_rad"] < levels.TOO_LITTLE * found["scatter_rad"]
+        why = " (too large, as few readings follow the course)" if few else ""
+        return f"{said}, {noise}{why}, RMS residual {in_unit(found['misfit_rad'], found)}"
     ratio = plain(found["misfit_rad"] / found["scatter_rad"], 2)
-    return f"{said}, misfit {ratio} times the {noise}"
+    return f"{said}, RMS residual {ratio} times the {noise}"
 
 
 def noise_in_words(found: Mapping[str, Any]) -> str:

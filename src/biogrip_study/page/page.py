@@ -160,10 +160,12 @@ def _answered(
     recorded = [told for case, told in judged if case.recorded and not study.published]
     asked = methods, study.shown_method.title
     who = "Run again, the paper's" if study.published else "The"
+    runs = max((int(row["shown_seeds"] or 0) for row in coverage), default=0)
     return {
+        "determined": answers.rows_of_determined(coverage, titles),
+        "none_means": answers.say_what_none_means(runs) if runs else "",
         "answers": [
             answers.say_what_recordings_tell(recorded),
-            answers.say_what_traces_tell(coverage, titles),
             answers.say_what_the_study_gives(*asked, titles, who, study.optimum_tolerance),
             answers.say_which_method_finds_it(*asked),
         ],
