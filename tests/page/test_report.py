@@ -133,7 +133,7 @@ def test_tables_have_titles_powers_and_right_aligned_numbers(opened: Opened, rep
     aligned = "all => all.map(e => getComputedStyle(e).textAlign)"
     assert {*cells.filter(has_text="·10⁻").evaluate_all(aligned)} == {"right"}
     page = opened.page
-    assert page.locator("caption").count() == 1
+    assert page.locator("caption").count() == 2
     # Full ones are folded, and can be downloaded.
     assert page.locator("details[open]").count() == 0
     links = page.locator("a[download]").evaluate_all("all => all.map(a => [a.download, a.href])")
