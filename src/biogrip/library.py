@@ -140,8 +140,8 @@ class TraceResult:
         from biogrip.command.page import address
 
         table = self.to_frame().to_html(na_rep="", border=0)
-        shown = f'{table}<img src="{address(self.plot())}" width="560">'
-        return f"<p>{self.data['model_title']}: fit {self.status}</p>{shown}"
+        said = f"<p>{self.data['model_title']}: fit {self.status}</p>"
+        return f'{said}{table}<img src="{address(self.plot())}" width="560">'
 
     def __str__(self) -> str:
         """Return what the command prints."""

@@ -18,15 +18,12 @@ def covered(case: str, quantity: str, hits: str, runs: str = "20") -> dict[str, 
 
 
 def test_a_row_a_sample_tells_how_many_traces_determine_a_quantity() -> None:
-    """With Wilson's limits: of 20 of 20 and of 0 of 20."""
     rows = [covered("cell", "k", "20"), covered("cell", "c_p", "0")]
     rows += [covered("drop", "k", "3"), covered("drop", "c", "", "")]
     assert answers.rows_of_determined(rows, TITLES) == [
         {"sample": "A cell", "k": "all: 20 of 20", "c_p": "none: 0 of 20"},
         {"sample": "A drop", "k": "some: 3 of 20", "c_p": ""},
     ]
-    said = answers.say_what_none_means(20).replace("\xa0", " ")
-    assert "0 of 20 means at most 16 % of all traces, 20 of 20 at least 84 %" in said
 
 
 def method(name: str, case: str, share: str, responses: str) -> dict[str, str]:

@@ -119,10 +119,9 @@ def identify_files(
         from biogrip.command.page import write_page
 
         write_page(outcome, report)
-    for fit, *_ in outcome.pictures.values():
-        if plot is not None:
-            with atomic_write(plot) as scratch:
-                scratch.write_bytes(b64decode(fit.partition(",")[2]))
+    if plot is not None and (pictures := outcome.pictures.get(names[0])):
+        with atomic_write(plot) as scratch:
+            scratch.write_bytes(b64decode(pictures[0].partition(",")[2]))
     print(in_words(outcome.found[0]) if alone else in_columns(outcome.found, outcome.refused))
     pairs = zip(every, outputs, strict=False)
     made = [path for own, path in pairs if own.name not in outcome.refused]

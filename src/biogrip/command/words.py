@@ -66,12 +66,10 @@ def without_model_in_words(found: Mapping[str, Any]) -> list[str]:
     left = f"{plain(own['times_noise'], 2)} times the noise"
     if found["instrument"] != _SWEEPS:
         left = f"{in_unit(own['misfit_rad'], found)}, {left}"
-    if not told and own["times_noise"] < 1:
-        return ["Model-free: with so large a noise the trace tells nothing."]
     if not told:
-        return [
-            f"Model-free: no linear viscoelastic sample fits; the least RMS residual is {left}."
-        ]
+        why = f"no linear viscoelastic sample fits; the least RMS residual is {left}"
+        too_large = "with so large a noise the trace tells nothing"
+        return [f"Model-free: {too_large if own['times_noise'] < 1 else why}."]
     width = max(len(each["quantity"]) for each in told)
     lines = (f"  {each['quantity']:<{width}}  {each['in_words']}" for each in told)
     any_sample = "Model-free, any linear viscoelastic sample that fits"

@@ -93,9 +93,9 @@ def draw_traces(axes: Axes, fits: Mapping[str, FittedTrace]) -> tuple[float, str
         axes.plot(
             fit.time_s, factor * fit.target, color=style.TARGET, linewidth=2.4, label="target"
         )
-    for (label, fitted), color in zip(fits.items(), style.RUNS, strict=False):
+    for (label, fitted), color, dash in zip(fits.items(), style.RUNS, ("-", "--"), strict=False):
         times, course = fitted.curve or (fitted.time_s, fitted.fitted)
-        axes.plot(times, factor * course, color=color, label=label)
+        axes.plot(times, factor * course, dash, color=color, label=label)
     axes.set_ylabel(with_unit(fit.read.title, unit))
     return factor, unit
 

@@ -329,17 +329,15 @@ def advice(
 
 def _none_better(tried: Sequence[FittedModel], chosen: FittedModel, spared: int) -> str:
     """State that none is preferred, how many were not fitted, and what is simpler and as good."""
-    text = f"none of the {len(tried)} models tried suits the trace better"
-    more = f"; {spared} more could not, however well they fit" * (spared > 0)
+    more = f"; {spared} more could not, however well they fit" if spared else ""
+    said = f"none of the {len(tried)} models tried suits the trace better{more}."
     lowest = min(tried, key=lambda fitted: fitted.delta_bic)
     fewer = len(chosen.model.names) - len(lowest.model.names)
-    if fewer <= 0 or lowest.delta_bic >= chosen.delta_bic:
-        return f"{text}{more}."
-    return (
-        f"{text}{more}. {lowest.model.title} (--model {lowest.candidate}), with "
-        f"{counted(fewer, 'parameter')} less, cannot be told from it (BIC lower by "
-        f"{plain(chosen.delta_bic)})."
-    )
+    if fewer <= 0:
+        return said
+    as_good = f"suits it as well with {counted(fewer, 'parameter')} less"
+    named = f"{lowest.model.title} (--model {lowest.candidate})"
+    return f"{said} {named} {as_good} (BIC lower by {plain(chosen.delta_bic)})."
 
 
 @dataclass(frozen=True)

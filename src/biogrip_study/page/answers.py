@@ -7,10 +7,9 @@ from typing import Any
 from biogrip.digits import legible, plain, with_unit
 from biogrip.fit.nested_fits import FittedModel, advice, fits_far_better, preferred
 from biogrip.judging.doubts import DOUBTFUL, OK, REJECTED
-from biogrip.judging.quantities import PROVIDED
 from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
 from biogrip.physics.models import CANDIDATES
-from biogrip_study.records.identifications import ALL, share_with_limits
+from biogrip_study.records.identifications import ALL
 
 TableRow = Mapping[str, str]
 
@@ -113,15 +112,6 @@ def rows_of_determined(
         {"sample": titles[case], **{name: row.get(name, "") for name in names}}
         for case, row in rows.items()
     ]
-
-
-def say_what_none_means(runs: int) -> str:
-    """Say which share is possible where no trace, or every one, determines a quantity."""
-    (_, _, most), (_, least, _) = share_with_limits(0, runs), share_with_limits(runs, runs)
-    return legible(
-        f"With 95 % confidence, 0 of {runs} means at most {100 * most:.0f} % of all traces, {runs} "
-        f"of {runs} at least {100 * least:.0f} %. Sums hold {PROVIDED}."
-    )
 
 
 def say_which_method_finds_it(methods: Iterable[TableRow], shown: str) -> str:
