@@ -3,12 +3,14 @@
 import ast
 import json
 import re
+import shlex
 import textwrap
 from collections import Counter
 from collections.abc import Callable, Iterable
 from contextlib import redirect_stderr, redirect_stdout, suppress
 from functools import cache
 from io import StringIO
+from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -20,11 +22,13 @@ import yaml
 from scipy.stats import chi2
 
 from biogrip.cli import main
+from biogrip.command.words import in_sentences
 from biogrip.digits import plain as in_digits
 from biogrip.digits import with_unit
 from biogrip.fit.least_squares import identify_many
 from biogrip.fit.problem import silent
-from biogrip.physics.models import ALIASES, MAXWELL_MODELS
+from biogrip.physics.drawing import sketched
+from biogrip.physics.models import ALIASES, MODELS
 from biogrip.physics.noise import add_noise, stream
 from biogrip.physics.simulation import simulated_response
 from biogrip.records import read_table
@@ -32,7 +36,7 @@ from biogrip_study.page import answers
 from biogrip_study.records.identifications import share_in_words
 from tests.helpers.default import STUDY, study_of
 from tests.helpers.key_reference import file_schema, reference
-from tests.helpers.places import EXAMPLE, EXAMPLE_TRUTH, ROOT
+from tests.helpers.places import EXAMPLE, ROOT
 from tests.published_numbers import renewed_numbers
 from workflow.paper.claims import Results, add_columns, judge_all
 
@@ -56,14 +60,16 @@ def _path(name: str, overlay: str = "") -> Path:
 def sample_models() -> str:
     return _table(
         {"model": f"`{model.name}`", "is": model.title}
-        | {"parameters": ", ".join(parameter.name for parameter in model.parameters)}
+        | {"elements": f"`{sketched(model)}`"}
         | {"usual names": ", ".join(name for name, of in ALIASES.items() if of == model.name)}
-        for model in MAXWELL_MODELS
+        for model in MODELS.values()
     )
 
 
 # N s/m
 _SLOW = 1000
+PIPETTE_TRUTH = {"k_s": 500.0, "k_v": 400.0, "c_v": 2000.0, "tau_v": 5.0}
+"""Parameters that data/pipette.csv is simulated with."""
 
 
 def paper_against_study() -> str:
@@ -299,11 +305,11 @@ def _range(values: "pd.Series[float]", how: str, unit: str = "") -> str:
 
 
 @cache
-def example(*options: str) -> tuple[str, dict[str, Any]]:
-    """What `biogrip identify` prints of the example, under options of the command, and its JSON."""
+def example(*options: str, trace: Path = EXAMPLE) -> tuple[str, dict[str, Any]]:
+    """What `biogrip identify` prints of a trace, under options of the command, and its JSON."""
     unheard = redirect_stderr(StringIO())
     with TemporaryDirectory() as folder, redirect_stdout(StringIO()) as said, unheard:
-        main(["identify", str(EXAMPLE), "--output", f"{folder}/found.json", *options])
+        main(["identify", str(trace), "--output", f"{folder}/found.json", *options])
         return said.getvalue(), json.loads(Path(folder, "found.json").read_text(encoding="utf-8"))
 
 
@@ -312,24 +318,54 @@ def printed_example(*options: str) -> str:
     return "\n".join(textwrap.indent(textwrap.fill(line, 136), "    ") for line in lines)
 
 
+def beginning_of_example() -> str:
+    with EXAMPLE.open(encoding="utf-8") as lines:
+        return f"```csv\n{''.join(islice(lines, 4))}```"
+
+
+def typed_in_readme() -> list[tuple[str, dict[str, Any]]]:
+    """What the commands of README print that identify one trace."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    typed = [
+        shlex.split(line) for line in re.findall(r"^    biogrip identify (\S+csv .*)$", text, re.M)
+    ]
+    left_out = "--plot", "fit.png", "--report", "page.html"
+    return [
+        example(*(it for it in options if it not in left_out), trace=ROOT / file)
+        for file, *options in typed
+    ]
+
+
 def identified_example() -> str:
-    """What it prints of the quantities, beside the truth, since the example is simulated."""
-    truth = yaml.safe_load(EXAMPLE_TRUTH.read_text())["cases"]["example"]["sample"]
-    del truth["model"]
-    made = ", ".join(f"{name} = {in_digits(value)}" for name, value in truth.items())
-    missed = ""
-    for q in example()[1]["quantities"]:
-        low, high = q["low"] or 0.0, q["high"] or np.inf
-        if not low <= (true := truth.get(q["quantity"], low)) <= high:
-            side, limit = ("upper", high) if true > high else ("lower", low)
-            missed += f", but for {q['quantity']}, whose {side} limit is {in_digits(limit, 4)}"
-    told = _quantities().partition("    Any linear sample")[0].rstrip()
-    return f"{told}\n\nTrue are {made}. The limits hold these{missed}."
+    """What is printed of the first trace's quantities, beside the truth: it is simulated."""
+    said, found = typed_in_readme()[0]
+    lines = [line for line in _said(said) if line.startswith(("data", "  "))]
+    told = "\n".join(f"    {line}" for line in lines[: 1 + len(found["quantities"])])
+    made = ", ".join(f"{name} = {in_digits(value)}" for name, value in PIPETTE_TRUTH.items())
+    missed = [
+        q["quantity"]
+        for q in found["quantities"]
+        if not q["low"] <= PIPETTE_TRUTH[q["quantity"]] <= q["high"]
+    ]
+    every = f"Every interval but of {missed}" if missed else "Every interval"
+    return f"{told}\n\nThe true values are {made}. {every} holds its true value."
+
+
+def doubted_example() -> str:
+    """Status of the second trace, and the first sentence of why."""
+    said, found = typed_in_readme()[1]
+    first, *_ = _said(said)
+    told = first, f"  {in_sentences(found['reasons'][0])[0]}"
+    return "\n".join(textwrap.indent(textwrap.fill(line, 112), "    ") for line in told)
+
+
+def _said(text: str) -> list[str]:
+    return text.replace(f"{ROOT}/", "").splitlines()
 
 
 def _quantities(*options: str) -> str:
     lines = [line.removeprefix("    ") for line in printed_example(*options).splitlines()]
-    told = (line for line in lines if line.startswith(("  ", "Any linear sample")))
+    told = (line for line in lines if line.startswith(("  ", "Model-free")))
     return "\n".join(f"    {line.removeprefix('  ')}" for line in told)
 
 
@@ -370,9 +406,17 @@ _COVERAGE = _path("coverage", "coverage")
 _SHORTER = "--no-compare", "--set", "gripper.arm_length_m=1.2e-3"
 PARTS: dict[str, dict[str, Callable[[], str]]] = {
     "docs/reference/config.md": {"keys": reference},
-    "README.md": {"answer": answer, "example": identified_example},
+    "README.md": {
+        "answer": answer,
+        "example": identified_example,
+        "doubtful": doubted_example,
+    },
     "CONTRIBUTING.md": {"folders": folders},
-    "docs/tutorial.md": {"printed": printed_example, "shorter": lambda: _quantities(*_SHORTER)},
+    "docs/tutorial.md": {
+        "file": beginning_of_example,
+        "printed": printed_example,
+        "shorter": lambda: _quantities(*_SHORTER),
+    },
     "docs/reference/command.md": {"help": command_help},
     "docs/models.md": {"models": sample_models},
     "docs/identifiability.md": {"slow": slow_branch, "methods": methods_compared},
@@ -384,7 +428,7 @@ PARTS: dict[str, dict[str, Callable[[], str]]] = {
         "readings": readings_compared,
         "choices": choices,
         "joint": joint,
-        "told": lambda: answers.say_what_traces_tell(read_table(_COVERAGE), _CASES),
+        "told": lambda: _table(answers.rows_of_determined(read_table(_COVERAGE), _CASES)),
         "protocols": protocols_compared,
     },
 }

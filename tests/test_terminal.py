@@ -78,13 +78,19 @@ def test_progress_is_shown_and_that_of_a_command_is_no_output(
 ) -> None:
     """A job's is: its log has what goes to standard error."""
     monkeypatch.setattr(terminal, "_PROGRESS_INTERVAL_S", 0.0)
-    with terminal.Progress(HOSTILE, 1, live=alone) as told:
-        told.done()
+    clock = iter([100.0, 130.0, 140.0])
+    monkeypatch.setattr("time.monotonic", lambda: next(clock, 140.0))
+    with terminal.Progress(HOSTILE, 2, live=alone) as told:
+        told.within(0.5)
+        told.done(2)
     shown = capsys.readouterr()
     seen, empty = (shown.err, shown.out) if alone else (shown.out, shown.err)
-    assert (seen, empty) == (f"{visible(HOSTILE)}: 1 of 1 done\n", "")
-    with terminal.Progress("a", 1) as told:
+    lines = [f"{visible(HOSTILE)}: {said}" for said in ("25 % done, 90 s left", "100 % done")]
+    assert (seen.splitlines(), empty) == (lines, "")
+    with terminal.Progress("a", 5) as told:
         told.doing(f"cell {HOSTILE}")
+        assert capsys.readouterr().out.startswith("a: step 2 of 5, cell ")
+        told.doing(HOSTILE)
     terminal.warn(f"{HOSTILE}: a note")
     for text in capsys.readouterr():
         assert visible(HOSTILE) in text or not text

@@ -86,6 +86,7 @@ class _Parser(argparse.ArgumentParser):
 
 def _model_lines() -> list[str]:
     """Return the names and titles of the sample models, usual ones first."""
+    from biogrip.physics.drawing import sketched
     from biogrip.physics.models import ALIASES, MODELS
 
     width = max(map(len, MODELS))
@@ -96,6 +97,7 @@ def _model_lines() -> list[str]:
         others = [other for other in (*ALIASES, *MODELS) if ALIASES.get(other, other) == name]
         also = ", ".join(other for other in others if other != usual)
         lines.append(f"  {usual:<{width}}  {MODELS[name].title}" + (f" ({also})" if also else ""))
+        lines.append(f"  {'':<{width}}  {sketched(MODELS[name])}")
     return [*lines, f"  {'jeffreys':<{width}}  Burgers fluid without its spring"]
 
 
@@ -183,6 +185,7 @@ def _add_settings(parser: Any) -> None:
             group = parser.add_argument_group("output")
             _add_file(group, "--report", "PAGE", "HTML page with pictures")
             _add_file(group, "--csv", "TABLE", "CSV file, a row per trace", dest="table")
+            _add_file(group, "--plot", "FIGURE", "PNG file, of one trace: its fit")
             text = "JSON file, of one trace [TRACE.identified.json]"
             _add_file(group, "--output", "FILE", text)
 

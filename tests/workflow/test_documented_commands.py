@@ -96,7 +96,9 @@ def test_what_the_readme_types_runs(place: Path) -> None:
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     for line in re.findall(r"^    (biogrip .*)$", text, re.MULTILINE):
         ran(place, *_typed(shlex.split(line)), PYTHONPATH=str(place / "src"))
-    assert all((place / name).is_file() for name in ("page.html", "found.csv", "cells.png"))
+    assert all(
+        (place / name).is_file() for name in ("fit.png", "page.html", "found.csv", "cells.png")
+    )
 
 
 def _typed(command: list[str]) -> list[str]:

@@ -100,7 +100,6 @@ def identify_many(
     improved, stalled = np.zeros_like(running), np.zeros(len(rngs), dtype=bool)
     courses: list[list[HistoryRow]] = [[] for _ in rngs]
     evaluations = settings.population
-    evaluations_of_all = evaluations * len(rngs)
     record()
     for generation in range(1, settings.max_generations + 1):
         waited = generation - 1 - improved[running] >= settings.patience
@@ -123,9 +122,9 @@ def identify_many(
         survivors, ranking = select(everyone, ranking, settings.survivors)
         improved[running[ranking[:, 0] < before]] = generation
         evaluations += children.shape[1]
-        evaluations_of_all += children.shape[1] * len(running)
         record()
-        progress(evaluations_of_all, float(ranking[:, 0].min()))
+        to_come = len(running) * (1 - generation / settings.max_generations)
+        progress(1 - to_come / len(rngs))
     fits = []
     for course, has_stalled in zip(courses, stalled.tolist(), strict=True):
         parameters, misfit, _, evaluations = course[-1]

@@ -86,7 +86,7 @@ def identify_by(
     problems, rngs
         Problem of each trace, and its random numbers.
     progress
-        Told of the number of responses and the lowest misfit.
+        Told of the share that is done.
 
     Returns
     -------

@@ -56,9 +56,10 @@ def identify_seeds(
     identified = partial(identify_by, method, case.block.method(method))
     recorded = read_measurements(measurements, list(seeds))
     experiment = experiment_for(case.experiment, recorded, calibrated).to_identify()
-    progress = Progress(f"{case.name}, {method}", len(seeds))
+    groups = [*seed_groups(seeds)]
+    progress = Progress(f"{case.name}, {method}", len(groups))
     rows, histories = [], []
-    for group in seed_groups(seeds):
+    for group in groups:
         traces = [recorded.readings[seed] for seed in group]
         rngs = [stream(case.study.config.study_seed, case.name, seed, method) for seed in group]
         problems = experiment.of_each(recorded.time_s, traces)
@@ -67,7 +68,7 @@ def identify_seeds(
             noise = None if recorded.target is None else rms(trace - recorded.target)
             rows.append((case.name, method, seed, *row_of(experiment, answer, noise)))
             histories.append(history_of(method, seed, experiment, answer))
-        progress.done(len(group))
+        progress.done()
     write_rows(parameters, identification_columns(experiment.model), rows)
     write_arrays(history, join_arrays(histories))
 
