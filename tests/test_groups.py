@@ -100,6 +100,7 @@ def test_pseudo_values_are_means_of_units_where_no_cell_is_bounded() -> None:
     assert 1 < nearer["a"] < 1.2
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("cells", "error"), [(5, 0.03), (6, 0.1), (12, 0.1), (12, 0.3)])
 def test_limits_hold_the_truth_and_equal_dishes_seldom_differ(cells: int, error: float) -> None:
     """In 500 pairs 95 % are known to within 3 % (three errors), in 1000 groups to within 2 %."""
@@ -436,6 +437,7 @@ def test_equal_cells_of_dishes_often_differ() -> None:
         assert f"| 3 | {100 * scatter:g} % | " + " | ".join(f"{it:.0f} %" for it in shares) in said
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("scatter", "ratio", "dishes"), [(0.2, 1.5, 6), (0.2, 1.3, 12)])
 def test_enough_dishes_tell_a_ratio(scatter: float, ratio: float, dishes: int) -> None:
     """By the rule of docs/groups.md in eight of ten; three standard deviations of 400 are 6 %."""

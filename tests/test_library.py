@@ -178,7 +178,7 @@ def test_a_few_readings_that_relax_are_a_response(count: int) -> None:
     assert np.all((limits["low"] < [100, 20]) & (limits["high"] > [100, 20]))
 
 
-@pytest.mark.parametrize("unit_s", [1e-7, 86_400.0])
+@pytest.mark.parametrize("unit_s", [1e-7, pytest.param(86_400.0, marks=pytest.mark.nightly)])
 def test_a_power_law_has_no_time_of_its_own(unit_s: float) -> None:
     """t^alpha/(k Gamma(1 + alpha)) of 100 units of time, 700 Pa and 0.25 in that unit."""
     times = np.linspace(0.5, 100.0, 120)

@@ -213,6 +213,7 @@ def test_models_are_compared_each_at_its_own_onset() -> None:
 HOLD = np.arange(0.4, 44, 0.4)
 
 
+@pytest.mark.nightly
 def test_limits_of_any_sample_hold_whatever_the_fitted_start() -> None:
     """Creep after a jump looks the same from any start up to the first reading."""
     values = 5 - 3 * np.exp(-HOLD / 8)
@@ -276,6 +277,7 @@ def test_a_ramp_before_the_first_reading_is_said_to_change_values() -> None:
     assert "If the load was no step" not in notes_on(times, values, config=protocol, **given)[1]
 
 
+@pytest.mark.nightly
 def test_a_start_between_0_and_the_first_reading_is_found() -> None:
     """Of a power law, which no other start fits; it is good to half a per cent with one at 0."""
     times: Array = 1.0 + 0.02 * np.arange(1000.0)

@@ -195,6 +195,7 @@ def test_a_trace_that_fails_is_a_row_that_says_why(here: Path) -> None:
         assert "<td>lost</td>" in (here / "page.html").read_text()
 
 
+@pytest.mark.nightly
 def test_a_killed_process_costs_a_batch_its_trace_alone(
     here: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

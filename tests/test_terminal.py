@@ -52,6 +52,7 @@ def test_what_was_typed_is_shown(capsys: pytest.CaptureFixture[str]) -> None:
     assert not OBEYED.search(error)
 
 
+@pytest.mark.nightly
 def test_names_of_traces_are_shown_wherever_they_are_said(tmp_path: Path, few: Path) -> None:
     page = tmp_path / "page.html"
     good, bad, absent = (tmp_path / f"{name}{HOSTILE}\n.csv" for name in ("good", "bad", "absent"))
@@ -112,6 +113,7 @@ def test_examples_are_commands_that_can_be_typed(
         _parser().parse_args(arguments)
 
 
+@pytest.mark.nightly
 def test_a_command_needs_no_standard_streams(tmp_path: Path) -> None:
     """As of a service, which closes them: no file gets what is printed."""
     write_drop(tmp_path / "trace.csv", 0)

@@ -189,6 +189,7 @@ def test_the_table_sorts_by_a_heading_and_its_names_are_text(visit: Any, page: P
     assert HOSTILE in str(opened.locator("#trace-12 img").first.get_attribute("alt"))
 
 
+@pytest.mark.nightly
 def test_sixty_traces_are_two_screens_and_six_sheets(
     visit: Any, dish: Outcome, tmp_path: Path
 ) -> None:

@@ -120,6 +120,7 @@ TYPED = (
 )
 
 
+@pytest.mark.nightly
 def test_the_method_needs_neither_the_study_nor_snakemake(tmp_path: Path) -> None:
     """Of every command, in a process in which importing either is an error."""
     shutil.copytree(ROOT / "data", tmp_path / "data")
