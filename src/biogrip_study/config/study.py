@@ -176,12 +176,6 @@ class Study:
         """Method that tables and figures of a single method show."""
         return METHODS[self.config.methods[0]]
 
-    @property
-    def fitting_method(self) -> Method:
-        """Least squares if the study has it, else the shown method."""
-        has_it = "least_squares" in self.config.methods
-        return METHODS["least_squares"] if has_it else self.shown_method
-
 
 def load_given_study(given: Mapping[str, Any], files: Sequence[Path]) -> Study:
     """Lay a config over the default study's, and check and type it, see `load_study`.

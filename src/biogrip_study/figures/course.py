@@ -58,6 +58,21 @@ def _runs(
     return identified, histories[drawn], looks
 
 
+def _draw_seeds(
+    axes: Axes,
+    histories: pd.DataFrame,
+    column: str,
+    seeds: int,
+    looks: Mapping[int, dict[str, Any]],
+) -> None:
+    """Draw a column over generations, a line a seed."""
+    if seeds > 1:
+        axes.plot([], [], color=style.ALL_SEEDS, label=seeds_in_words(seeds))
+    for seed, rows in histories.groupby("seed"):
+        axes.step(rows["generation"], rows[column], where="post", **looks.get(seed, _SEED))
+    axes.set_xlim(0, histories["generation"].max())
+
+
 def draw_convergence(case: Case, identifications: Path, history: Path) -> Figure:
     """Draw each seed's excess of the misfit over its noise, highlighting a run of each basin."""
     method, tolerance = case.study.shown_method, case.study.near_noise_tolerance
@@ -67,17 +82,13 @@ def draw_convergence(case: Case, identifications: Path, history: Path) -> Figure
     unit = noise if noisy else noise.where(noise < 0, identified["misfit"].min())
     drawn = style.figure(style.COLUMN_IN, 2.9)
     axes = drawn.subplots()
-    if len(identified) > 1:
-        axes.plot([], [], color=style.ALL_SEEDS, label=seeds_in_words(len(identified)))
-    for seed, rows in histories.groupby("seed"):
-        excess = 100 * (rows["best_misfit"] / unit[seed] - 1)
-        axes.plot(rows["generation"], excess, **looks.get(seed, _SEED))
+    excess = 100 * (histories["best_misfit"] / histories["seed"].map(unit) - 1)
+    _draw_seeds(axes, histories.assign(excess=excess), "excess", len(identified), looks)
     reference = "noise" if noisy else "the lowest"
     line: dict[str, Any] = {"color": style.TARGET, "linewidth": 0.8}
     axes.axhline(0, linestyle="--", label=reference, **line)
-    last = int(histories["generation"].max())
     start = case.block.method("genetic").mutation_start
-    if method.name == "genetic" and start <= last:
+    if method.name == "genetic" and start <= histories["generation"].max():
         axes.axvline(start, linestyle=":", label="mutation starts", **line)
     title = case.title
     if noisy:
@@ -87,8 +98,8 @@ def draw_convergence(case: Case, identifications: Path, history: Path) -> Figure
         title += f": {reached} of {len(identified)} {words}"
     axes.set_yscale("symlog", linthresh=1, linscale=0.5)
     axes.yaxis.set_major_formatter("{x:g}")
-    axes.set(xlim=(0, last), xlabel=method.step, title=title)
-    axes.set(ylim=(-0.8, None), ylabel=f"best misfit above {reference} (%)")
+    axes.set(xlabel=method.step, title=title, ylim=(-0.8, None))
+    axes.set_ylabel(f"best misfit above {reference} (%)")
     drawn.legend(loc="outside lower center", ncols=2)
     return drawn
 
@@ -104,11 +115,7 @@ def draw_evolution(case: Case, identifications: Path, history: Path) -> Figure:
     for axes in grid[len(parameters) :]:
         axes.set_axis_off()
     for axes, parameter in zip(grid, parameters, strict=False):
-        if len(identified) > 1:
-            axes.plot([], [], color=style.ALL_SEEDS, label=seeds_in_words(len(identified)))
-        for seed, rows in histories.groupby("seed"):
-            look = looks.get(seed, _SEED)
-            axes.step(rows["generation"], rows[parameter.column], where="post", **look)
+        _draw_seeds(axes, histories, parameter.column, len(identified), looks)
         if (target := case.parameters.get(parameter.name, 0)) > 0:
             axes.axhline(target, color=style.TARGET, linestyle="--", label="target")
         if parameter.name in printed:
@@ -116,10 +123,7 @@ def draw_evolution(case: Case, identifications: Path, history: Path) -> Figure:
             axes.axhline(printed[parameter.name], color=style.PAPER, linestyle=":", label=label)
         if np.any(histories[parameter.column] > 0):
             axes.set_yscale("log")
-        axes.set(
-            ylabel=with_unit(parameter.symbol, parameter.unit),
-            xlim=(0, histories["generation"].max()),
-        )
+        axes.set_ylabel(with_unit(parameter.symbol, parameter.unit))
     for axes in grid[len(parameters) - 2 : len(parameters)]:
         axes.set_xlabel(case.study.shown_method.step)
     drawn.legend(*grid[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)

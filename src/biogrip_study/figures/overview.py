@@ -26,6 +26,7 @@ from biogrip_study.figures.case_fit import (
     judged_fit,
     seeds_in_words,
 )
+from biogrip_study.methods.registry import METHODS
 from biogrip_study.records.identifications import (
     near_noise,
     near_noise_words,
@@ -187,7 +188,9 @@ def _draw_moduli_of_case(
     omega = np.geomspace(slowest / 30, 30 * fastest, _MODULI_DRAWN)
     model = case.experiment.model
     near = []
-    for method in {m.name: m for m in (study.shown_method, study.fitting_method)}.values():
+    # The first method, and least squares if the study has it.
+    names = dict.fromkeys([*study.config.methods[:1], "least_squares"])
+    for method in [METHODS[name] for name in names if name in study.config.methods]:
         runs = first_seeds(read_identifications(identified, case, method.name))
         fits = runs[[p.column for p in model.parameters]].to_numpy(float)
         moduli = _modulus(model.network(fits), omega)
