@@ -116,7 +116,7 @@ def fit(
     recorded = read_measurements(measurements, list(seeds))
     experiment = experiment_for(case.experiment, recorded, calibrated).to_identify(*models.values())
     progress = Progress(f"{case.name}, models", len(models) * len(seeds))
-    rows: dict[str, list[tuple[str | int, ...]]] = {name: [] for name in models}
+    rows: list[tuple[str | int, ...]] = []
     for group in seed_groups(seeds):
         traces = experiment.of_each(recorded.time_s, [recorded.readings[seed] for seed in group])
         posed, rngs = {}, {}
@@ -128,11 +128,11 @@ def fit(
         fits_by_model = fit_models(posed, case.block.least_squares, rngs, done)
         for name, answers in fits_by_model.items():
             sizes = len(models[name].names), len(recorded.time_s)
-            rows[name] += [
+            rows += [
                 (case.name, name, seed, *sizes, f"{answer.misfit:.8e}")
                 for seed, answer in zip(group, answers.values(), strict=True)
             ]
-    MODEL_FITS.write(fits, (row for of_model in rows.values() for row in of_model))
+    MODEL_FITS.write(fits, rows)
 
 
 def experiment_for(
