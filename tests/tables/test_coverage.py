@@ -50,7 +50,7 @@ def test_verdicts_are_counted_beside_intervals(tmp_path: Path, target: Path) -> 
     file = tmp_path / CASE / "seeds_0-2.csv"
     INTERVALS.write(file, rows)
     every_other = study_of(OVERLAY.replace("0.9}", "0.9, verdicts_every: 2}"))
-    made = coverage(every_other, [target], [file], [])
+    made = coverage(every_other, [target], [file])
     found = {row["quantity"]: row for row in made.rows}
     assert list(found) == ["k", "k_p", "c_p"]
     assert (found["k_p"]["target"], found["k_p"]["shown_one_sided_true"]) == (1e-4, 1)
@@ -70,7 +70,7 @@ def test_verdicts_are_counted_beside_intervals(tmp_path: Path, target: Path) -> 
         with pytest.raises(
             BiogripError, match=r"seeds_0-2.csv: found \d+ rows, wanted .* --forcerun"
         ):
-            coverage(every_other, [target], [file], [])
+            coverage(every_other, [target], [file])
 
 
 def test_verdicts_of_every_seed_are_counted(tmp_path: Path) -> None:
@@ -131,11 +131,12 @@ def test_the_bound_of_a_case_is_that_of_its_calibration(tmp_path: Path) -> None:
         slopes = (above - below) / 2e-5
         sigma = 0.1 * rotation(MODEL, CELL, case.times_s).max()
         bounds[name] = 100 * sigma * np.sqrt(np.linalg.inv(slopes @ slopes.T)[0, 0])
-    made, calibrations, batches = (
+    made, batches = (
         [tmp_path / file.format(name) for name in study.cases]
-        for file in ("{}.csv", "{}.yaml", "{}/seeds_1-2.csv")
+        for file in ("{}.csv", "{}/seeds_1-2.csv")
     )
-    table = coverage(study, made, batches, calibrations)
+    calibrations = {name: tmp_path / f"{name}.yaml" for name in study.cases}
+    table = coverage(replace(study, calibrations=calibrations), made, batches)
     assert {row["case"]: row["bound_percent"] for row in table.rows} == pytest.approx(
         bounds, rel=1e-4
     )
@@ -146,7 +147,7 @@ def test_some_seeds_are_judged_in_full(tmp_path: Path, target: Path) -> None:
     expected = tmp_path / "expected.json"
     write_object(expected, {"quantities": [{"quantity": "k", "verdict": "determined"}]})
     case = study_of(OVERLAY.replace("0.9}", "0.9, verdicts_every: 3}")).case(CASE)
-    stage.estimate_intervals(case, range(2, 5), target, expected, [], tmp_path / "i.csv")
+    stage.estimate_intervals(case, range(2, 5), target, expected, tmp_path / "i.csv")
     found = INTERVALS.read(tmp_path / "i.csv")
     assert set(found["seed"]) == {2, 3, 4}
     whole = found[found["verdict"].notna()]
@@ -197,12 +198,12 @@ def test_the_bound_of_a_case_is_of_its_own_calibration(tmp_path: Path) -> None:
     """An arm a thousand times stiffer leaves less of a cell to be seen."""
     study = study_of("{measurement: {rate_Hz: 1.0}, cases: {endothelial_cell: null}}")
     arm = study.cases[CASE].gripper.left
-    files, of_targets, batches = [], [], []
+    files, of_targets, batches = {}, [], []
     for name, times in (("liquid_drop_1", 1.0), (CASE, 1000.0)):
         stiff = replace(arm, stiffness_Nm_per_rad=times * arm.stiffness_Nm_per_rad)
-        files.append(tmp_path / f"{name}.yaml")
+        files[name] = tmp_path / f"{name}.yaml"
         arms, known = ({"left": both, "right": both} for both in (stiff, arm))
-        files[-1].write_text(calibration_yaml(arms, known))
+        files[name].write_text(calibration_yaml(arms, known))
         of_targets.append(tmp_path / f"{name}.csv")
         targets.simulate_target(study.cases[name], of_targets[-1])
         batches.append(tmp_path / name / "seeds_0-1.csv")
@@ -210,10 +211,11 @@ def test_the_bound_of_a_case_is_of_its_own_calibration(tmp_path: Path) -> None:
         rest = 1.0, 0.9, 1.1, 1.0, "determined", 0.9, 1.1
         seeds = [(name, q, seed, *rest) for seed in range(2) for q in every]
         INTERVALS.write(batches[-1], seeds)
-    rows = coverage(study, of_targets, batches, files).rows
-    for name, file, of_target in zip(study.cases, files, of_targets, strict=True):
+    study = replace(study, calibrations=files)
+    rows = coverage(study, of_targets, batches).rows
+    for name, of_target in zip(study.cases, of_targets, strict=True):
         (shown,) = (row for row in rows if (row["case"], row["quantity"]) == (name, "c + c_p"))
-        alone = bounds_at_truth(study.cases[name], of_target, [file])
+        alone = bounds_at_truth(study.cases[name], of_target)
         assert shown["bound_percent"] == pytest.approx(100 * alone["c + c_p"])
     ends = [row["bound_percent"] for row in rows if row["quantity"] == "c + c_p"]
     assert ends[1] > 10 * ends[0]

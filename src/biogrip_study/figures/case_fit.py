@@ -35,7 +35,7 @@ def first_of_basins(identified: pd.DataFrame, case: Case) -> dict[str, pd.Series
 
 
 def fits_of_basins(
-    case: Case, identifications: Path, measurements: list[Path], calibrated: list[Path]
+    case: Case, identifications: Path, measurements: list[Path]
 ) -> dict[str, FittedTrace]:
     """Return the fit of the first run of each basin, by label, from files of a case."""
     identified = read_identifications(identifications, case, case.study.shown_method.name)
@@ -44,7 +44,7 @@ def fits_of_basins(
         seed = int(run["seed"])
         values = {p.name: float(run[p.column]) for p in case.sample.model.parameters}
         holding = next(path for path in measurements if seed in seeds_of(path.stem))
-        fits[f"fit ({words})"] = _fit_of_seed(case, seed, values, holding, calibrated)
+        fits[f"fit ({words})"] = _fit_of_seed(case, seed, values, holding)
     return fits
 
 
@@ -53,10 +53,9 @@ def _fit_of_seed(
     seed: int,
     values: Mapping[str, float],
     measurements: Path,
-    calibrated: list[Path],
 ) -> FittedTrace:
     made = read_measurements(measurements, [seed])
-    experiment = experiment_for(case.experiment, made, calibrated)
+    experiment = experiment_for(case.experiment, made)
     return fit_of(
         experiment, values, made.time_s, made.readings[seed], made.known.get("sd"), made.target
     )
@@ -74,19 +73,15 @@ def seeds_in_words(count: int) -> str:
     return f"all {count} seeds" if count <= SHOWN_SEEDS else f"first {SHOWN_SEEDS} of {count} seeds"
 
 
-def draw_fits(
-    case: Case, identifications: Path, measurements: list[Path], calibrated: list[Path]
-) -> Figure:
+def draw_fits(case: Case, identifications: Path, measurements: list[Path]) -> Figure:
     """Draw the fit of the first run in each basin, beside the trace of the first of these."""
-    fits = fits_of_basins(case, identifications, measurements, calibrated)
+    fits = fits_of_basins(case, identifications, measurements)
     return draw_fit(fits, case.title, case.published.axis_rad)
 
 
-def draw_judged_fit(
-    case: Case, verdicts: Path, measurements: list[Path], calibrated: list[Path]
-) -> Figure:
+def draw_judged_fit(case: Case, verdicts: Path, measurements: list[Path]) -> Figure:
     """Draw the judged trace of a case and its best fit."""
-    fit = judged_fit(case, read_verdicts(verdicts), measurements[0], calibrated)
+    fit = judged_fit(case, read_verdicts(verdicts), measurements[0])
     trace = "recorded trace" if case.recorded else f"seed {JUDGED_SEED}"
     return draw_fit({f"best fit ({trace})": fit}, case.title, case.published.axis_rad)
 
@@ -97,12 +92,10 @@ def draw_profiles(case: Case, verdicts: Path, expected: list[Path]) -> Figure:
     return draw_profiles_of(read_verdicts(verdicts), others, case.title, case.parameters)
 
 
-def judged_fit(
-    case: Case, verdicts: Mapping[str, Any], measurements: Path, calibrated: list[Path]
-) -> FittedTrace:
+def judged_fit(case: Case, verdicts: Mapping[str, Any], measurements: Path) -> FittedTrace:
     """Return the judged trace of a case and its best fit."""
     values = {item["quantity"]: item["value"] for item in verdicts["quantities"]}
-    return _fit_of_seed(case, JUDGED_SEED, values, measurements, calibrated)
+    return _fit_of_seed(case, JUDGED_SEED, values, measurements)
 
 
 def draw_force(case: Case, target: Path) -> Figure:

@@ -166,15 +166,13 @@ _DOTS: dict[str, Any] = {
 _PAPER: dict[str, Any] = {"color": style.PAPER, "linestyle": (0, (4, 2))}
 
 
-def draw_scatter(
-    case: Case, identifications: Path, target: Path, expected: Path, calibrated: list[Path]
-) -> Figure:
+def draw_scatter(case: Case, identifications: Path, target: Path, expected: Path) -> Figure:
     """Draw identified over target for every quantity and method."""
     verdicts = {item["quantity"]: item["verdict"] for item in read_verdicts(expected)["quantities"]}
     identified = read_identifications(identifications, case)
     values = values_by_quantity(identified, case.experiment.searched)
     printed = case.published.identified
-    bounds = bounds_at_truth(case, target, calibrated)
+    bounds = bounds_at_truth(case, target)
     drawn, grid = style.row_of_panels(len(bounds), 3.1)
     quantities = parameters_and_sum(case.experiment.searched)
     for index, (axes, quantity) in enumerate(zip(grid, quantities, strict=True)):

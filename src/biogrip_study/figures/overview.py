@@ -49,13 +49,12 @@ def draw_overview(
     identifications: list[Path],
     expected: list[Path],
     measurements: list[Path],
-    calibrated: list[Path],
 ) -> Figure:
     """Draw a fit of each basin of the first case, and identified over target values of some."""
     cases = list(study.cases.values())
     drawn = style.figure(style.PAGE_IN, 3.0)
     axes = drawn.subplots(1, 1 + len(cases), width_ratios=[2] + [1.05] * len(cases))
-    fits = fits_of_basins(cases[0], identifications[0], measurements, calibrated)
+    fits = fits_of_basins(cases[0], identifications[0], measurements)
     factor, _ = draw_traces(axes[0], fits)
     fit = next(iter(fits.values()))
     axes[0].set_ylim(top=1.65 * factor * fit.measured.max())
@@ -116,7 +115,7 @@ def _draw_ratios(axes: Axes, case: Case, fits: pd.DataFrame, bounded: set[str]) 
     axes.set_xticks(range(len(ticks)), ticks)
 
 
-def draw_answer(study: Study, verdicts: Path, measurements: Path, calibrated: list[Path]) -> Figure:
+def draw_answer(study: Study, verdicts: Path, measurements: Path) -> Figure:
     """Draw a gripper, the judged trace of the only case, and what it tells of two dampers."""
     (case,) = study.cases.values()
     judged = read_verdicts(verdicts)
@@ -125,7 +124,7 @@ def draw_answer(study: Study, verdicts: Path, measurements: Path, calibrated: li
     (device, trace), profiles = drawn.subplots(2, 2)
     _device(device)
     style.panel(device, "1", "two arms squeeze")
-    fit = judged_fit(case, judged, measurements, calibrated)
+    fit = judged_fit(case, judged, measurements)
     factor, unit = draw_traces(trace, {"fit": fit})
     trace.set_ylim(top=1.45 * factor * fit.measured.max())
     trace.set(xlabel="time (s)", ylabel=with_unit("rotation", unit))

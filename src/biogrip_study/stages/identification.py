@@ -21,7 +21,6 @@ from biogrip.physics.noise import rms, stream
 from biogrip.records import read_table, write_rows
 from biogrip.terminal import Progress
 from biogrip_study.config.study import Case
-from biogrip_study.gripper.calibration import with_calibration
 from biogrip_study.methods.genome import lowest_encodable
 from biogrip_study.methods.registry import identify_by
 from biogrip_study.records.identifications import (
@@ -48,14 +47,13 @@ def identify_seeds(
     method: str,
     seeds: Sequence[int],
     measurements: Path,
-    calibrated: list[Path],
     parameters: Path,
     history: Path,
 ) -> None:
     """Identify a batch of seeds with one method."""
     identified = partial(identify_by, method, case.block.method(method))
     recorded = read_measurements(measurements, list(seeds))
-    experiment = experiment_for(case.experiment, recorded, calibrated).to_identify()
+    experiment = experiment_for(case.experiment, recorded).to_identify()
     progress = Progress(f"{case.name}, {method}", len(seeds))
     rows, histories = [], []
     for group in seed_groups(seeds):
@@ -77,7 +75,6 @@ def join(
     batches: list[Path],
     histories: list[Path],
     measurements: list[Path],
-    calibrated: list[Path],
     identifications: Path,
     history: Path,
 ) -> None:
@@ -95,7 +92,7 @@ def join(
     lowest: dict[str, str] = {}
     for file in measurements:
         recorded = read_measurements(file)
-        experiment = experiment_for(case.experiment, recorded, calibrated).to_identify()
+        experiment = experiment_for(case.experiment, recorded).to_identify()
         ranges = [experiment.ranges[parameter.range_name] for parameter in searched]
         traces = recorded.readings
         posed = experiment.of_each(recorded.time_s, [*traces.values()])
@@ -108,13 +105,11 @@ def join(
     write_arrays(history, join_arrays([read_arrays(batch) for batch in histories]))
 
 
-def fit(
-    case: Case, seeds: Sequence[int], measurements: Path, calibrated: list[Path], fits: Path
-) -> None:
+def fit(case: Case, seeds: Sequence[int], measurements: Path, fits: Path) -> None:
     """Fit a batch of seeds by least squares with each model."""
     models = {name: sample.model for name, sample in case.models.items()}
     recorded = read_measurements(measurements, list(seeds))
-    experiment = experiment_for(case.experiment, recorded, calibrated).to_identify(*models.values())
+    experiment = experiment_for(case.experiment, recorded).to_identify(*models.values())
     progress = Progress(f"{case.name}, models", len(models) * len(seeds))
     rows: list[tuple[str | int, ...]] = []
     for group in seed_groups(seeds):
@@ -135,11 +130,8 @@ def fit(
     MODEL_FITS.write(fits, rows)
 
 
-def experiment_for(
-    experiment: Experiment, measurements: Measurements, calibrated: Sequence[Path]
-) -> Experiment:
+def experiment_for(experiment: Experiment, measurements: Measurements) -> Experiment:
     """Return the experiment that traces of a case are identified by: see `for_trace`."""
-    experiment = with_calibration(experiment, calibrated)
     if experiment.simulated:
         return experiment
     # Imported here: of a simulated trace nothing has to be judged.

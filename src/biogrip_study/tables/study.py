@@ -14,7 +14,6 @@ from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, N
 from biogrip.levels import WIDE
 from biogrip.physics.noise import standard_deviation
 from biogrip_study.config.study import Case, Study
-from biogrip_study.gripper.calibration import with_calibration
 from biogrip_study.methods.registry import METHODS
 from biogrip_study.records.identifications import (
     ENCODABLE,
@@ -145,18 +144,14 @@ _COVERAGE_COLUMNS = (
 _COUNTED = {"determined": (DETERMINED,), "one_sided": (BOUNDED_BELOW, BOUNDED_ABOVE)}
 
 
-def coverage(
-    study: Study, targets: list[Path], intervals: list[Path], calibrated: list[Path]
-) -> ShownTable:
+def coverage(study: Study, targets: list[Path], intervals: list[Path]) -> ShownTable:
     """Compare estimates and intervals of many seeds with the true values and the bound.
 
-    Targets are files of all cases, in their order; calibrated grippers are named like their case.
+    Targets are files of all cases, in their order.
     """
     rows: list[Row] = []
-    bounds = {
-        name: bounds_at_truth(case, target, [file for file in calibrated if file.stem == name])
-        for (name, case), target in zip(study.cases.items(), targets, strict=True)
-    }
+    files = zip(study.cases.items(), targets, strict=True)
+    bounds = {name: bounds_at_truth(case, target) for (name, case), target in files}
     for case, head, estimated in _by_quantity(study, intervals):
         fitted = estimated[estimated["estimate_rest_known"].notna()]
         shown = estimated[estimated["verdict"].notna()]
@@ -193,12 +188,12 @@ def _by_quantity(
             yield case, head | {"target": target}, of_case[of_case["quantity"] == quantity.label]
 
 
-def bounds_at_truth(case: Case, target: Path, calibrated: Sequence[Path]) -> dict[str, float]:
+def bounds_at_truth(case: Case, target: Path) -> dict[str, float]:
     """Return the Cramér-Rao bound of what is searched of a case, at the true parameters, by label.
 
     That is the standard deviation of the quantity's logarithm.
     """
-    experiment = with_calibration(case.experiment, calibrated)
+    experiment = case.experiment
     time_s, _, rotation = read_target(target, case.times_s)
     log_truth = experiment.logs(case.parameters)
     _, sensitivity = experiment.of(time_s, rotation).residuals(log_truth)

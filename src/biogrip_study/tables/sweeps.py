@@ -19,7 +19,6 @@ from biogrip.physics.noise import rms
 from biogrip.physics.simulation import simulated_response
 from biogrip_study.config.study import Case, Study
 from biogrip_study.config.study_blocks import AxisBlock
-from biogrip_study.gripper.calibration import with_calibration
 from biogrip_study.methods.genome import nearest_encodable
 from biogrip_study.methods.registry import METHODS
 from biogrip_study.records.identifications import (
@@ -46,22 +45,17 @@ POINTS = RowFile(
 _FACTOR, _BOUNDS_OF_BASIN = math.log(2), 4.0
 
 
-def judge_points(
-    study: Study, sweep: str, identifications: list[Path], calibrated: list[Path], points: Path
-) -> None:
+def judge_points(study: Study, sweep: str, identifications: list[Path], points: Path) -> None:
     """Compute errors and shares of successful seeds at every point of a sweep.
 
-    Batches of identifications are in folders named like point and method, calibrations are named
-    like their point.
+    Batches of identifications are in folders named like point and method.
     """
     block, rows = study.config.sweeps[sweep], list[tuple[str | int, ...]]()
     for name in block.cases:
         true, grid, bounds = study.cases[name].parameters, block.points(sweep, name), {}
         for point in grid:
             case = study.points[point.name]
-            of_point = [file for file in calibrated if file.stem == point.name]
-            experiment = with_calibration(case.experiment, of_point)
-            bounds[point.name] = bounds_percent(experiment, case.noise, true, case.times_s)
+            bounds[point.name] = bounds_percent(case.experiment, case.noise, true, case.times_s)
         heads = headlines(
             [(q.label, percent) for of_point in bounds.values() for q, percent in of_point]
         )
