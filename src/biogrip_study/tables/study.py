@@ -90,26 +90,24 @@ _MODEL_COLUMNS = (
 
 def models(study: Study, fits: list[Path]) -> ShownTable:
     """Count over seeds which model has the lowest AIC and BIC, see `aic_and_bic`."""
-    fitted = pd.concat([read_fits(study, path) for path in fits])
-    fitted["aic"], fitted["bic"] = aic_and_bic(
-        fitted["misfit"], fitted["samples"], fitted["parameters"]
-    )
-    rows = []
-    for case, made in study.cases.items():
-        maker = None if made.recorded else made.sample.candidate
-        of_case = fitted[fitted["case"] == case]
-        # In the configured order, since idxmin takes the first of equals.
-        tried = list(of_case["model"].unique())
-        values = {c: of_case.pivot(index="seed", columns="model", values=c) for c in ("aic", "bic")}
-        delta = {c: wide[tried].sub(wide.min(axis=1), axis=0) for c, wide in values.items()}
-        for name in tried:
-            model = made.models[name].model
-            row: Row = {"case": case, "model": model.title + " (made the traces)" * (name == maker)}
-            row |= {"parameters": len(model.names), "seeds": len(delta["aic"])}
-            for criterion, above_lowest in delta.items():
-                row[f"median_delta_{criterion}"] = above_lowest[name].median()
-                row[f"chosen_by_{criterion}"] = (above_lowest.idxmin(axis=1) == name).sum()
-            rows.append(row)
+    fitted = pd.concat([read_fits(study, path) for path in fits], ignore_index=True)
+    told = fitted["misfit"], fitted["samples"], fitted["parameters"]
+    fitted["aic"], fitted["bic"] = aic_and_bic(*told)
+    for name in ("aic", "bic"):
+        of_traces = fitted.groupby(["case", "seed"])[name]
+        fitted[f"delta_{name}"] = fitted[name] - of_traces.transform("min")
+        # Of equals the first, in the configured order.
+        fitted[f"by_{name}"] = fitted.index.isin(of_traces.idxmin())
+    rows: list[Row] = []
+    for (case, candidate), of_model in fitted.groupby(["case", "model"], sort=False):
+        made = study.cases[case]
+        maker, model = candidate == made.sample.candidate, made.models[candidate].model
+        row: Row = {"case": case, "parameters": len(model.names), "seeds": len(of_model)}
+        row["model"] = model.title + " (made the traces)" * (maker and not made.recorded)
+        for name in ("aic", "bic"):
+            row[f"median_delta_{name}"] = of_model[f"delta_{name}"].median()
+            row[f"chosen_by_{name}"] = of_model[f"by_{name}"].sum()
+        rows.append(row)
     caption = (
         "Simplest adequate model: by how much each model's AIC and BIC exceed the lowest, and in "
         "how many seeds it has the lowest."
