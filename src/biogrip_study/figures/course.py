@@ -11,6 +11,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+import biogrip_study.records.identifications as records
 from biogrip.arrays import Array
 from biogrip.digits import with_unit
 from biogrip.figures import style
@@ -19,18 +20,6 @@ from biogrip.judging.verdicts import DETERMINED
 from biogrip_study.config.study import Case
 from biogrip_study.figures.case_fit import SHOWN_SEEDS, first_of_basins, seeds_in_words
 from biogrip_study.methods.registry import METHODS
-from biogrip_study.records.identifications import (
-    ENCODABLE,
-    chi_square_increase,
-    near_noise,
-    near_noise_words,
-    reached_encodable,
-    read_histories,
-    read_identifications,
-    read_verdicts,
-    share_in_words,
-    values_by_quantity,
-)
 from biogrip_study.tables.study import bounds_at_truth
 
 # Of increases of chi-squared, smaller ones being drawn there.
@@ -46,14 +35,14 @@ def _runs(
     Histories are those of the seeds drawn individually and of these first ones.
     """
     method = case.study.shown_method.name
-    identified = read_identifications(identifications, case, method)
+    identified = records.read_identifications(identifications, case, method)
     looks = {
         int(run["seed"]): {"color": color, "linewidth": 1.5, "zorder": 3, "label": words}
         for (words, run), color in zip(
             first_of_basins(identified, case).items(), style.RUNS, strict=False
         )
     }
-    histories = read_histories(history, method, values)
+    histories = records.read_histories(history, method, values)
     drawn = histories["seed"].isin({*range(SHOWN_SEEDS), *looks})
     return identified, histories[drawn], looks
 
@@ -92,9 +81,9 @@ def draw_convergence(case: Case, identifications: Path, history: Path) -> Figure
         axes.axvline(start, linestyle=":", label="mutation starts", **line)
     title = case.title
     if noisy:
-        words = near_noise_words(tolerance)
+        words = records.near_noise_words(tolerance)
         axes.axhline(100 * tolerance, linestyle="-.", label=words, **line)
-        reached = near_noise(identified, tolerance).sum()
+        reached = records.near_noise(identified, tolerance).sum()
         title += f": {reached} of {len(identified)} {words}"
     axes.set_yscale("symlog", linthresh=1, linscale=0.5)
     axes.yaxis.set_major_formatter("{x:g}")
@@ -133,9 +122,9 @@ def draw_evolution(case: Case, identifications: Path, history: Path) -> Figure:
 
 def draw_waterfall(case: Case, identifications: Path) -> Figure:
     """Draw sorted increases of chi-squared, of every method's runs and of best encodable points."""
-    identified = read_identifications(identifications, case)
-    increase = np.maximum(chi_square_increase(identified, case), _LOWEST)
-    reached = reached_encodable(identified, case)
+    identified = records.read_identifications(identifications, case)
+    increase = np.maximum(records.chi_square_increase(identified, case), _LOWEST)
+    reached = records.reached_encodable(identified, case)
     drawn = style.figure(style.COLUMN_IN, 3.5)
     axes = drawn.subplots()
     methods = identified["method"].unique()
@@ -143,10 +132,12 @@ def draw_waterfall(case: Case, identifications: Path) -> Figure:
     for name, width in zip(methods, np.linspace(3.2, 1.0, len(methods)), strict=True):
         method, runs = METHODS[name], identified["method"] == name
         place = 100 * (np.arange(runs.sum()) + 0.5) / runs.sum()
-        label = f"{method.title}: {share_in_words(int(reached[runs].sum()), len(place))}"
+        label = f"{method.title}: {records.share_in_words(int(reached[runs].sum()), len(place))}"
         look = {"color": style.COLORS[method.color], "linewidth": width}
         axes.plot(place, np.sort(increase[runs]), label=label, linestyle=method.dashes, **look)
-    least = np.sort(chi_square_increase(identified, case, ENCODABLE)[runs]).clip(_LOWEST)
+    least = np.sort(records.chi_square_increase(identified, case, records.ENCODABLE)[runs]).clip(
+        _LOWEST
+    )
     axes.plot(place, least, "--", color=style.TARGET, linewidth=0.8, label="best encodable point")
     axes.set(yscale="log", ylim=(_LOWEST / 2, None), xlim=(0, 100), xlabel="seeds, sorted (%)")
     axes.set_ylabel(f"Δχ² over the lowest known, {_LOWEST:g} or more")
@@ -168,9 +159,11 @@ _PAPER: dict[str, Any] = {"color": style.PAPER, "linestyle": (0, (4, 2))}
 
 def draw_scatter(case: Case, identifications: Path, target: Path, expected: Path) -> Figure:
     """Draw identified over target for every quantity and method."""
-    verdicts = {item["quantity"]: item["verdict"] for item in read_verdicts(expected)["quantities"]}
-    identified = read_identifications(identifications, case)
-    values = values_by_quantity(identified, case.experiment.searched)
+    verdicts = {
+        item["quantity"]: item["verdict"] for item in records.read_verdicts(expected)["quantities"]
+    }
+    identified = records.read_identifications(identifications, case)
+    values = records.values_by_quantity(identified, case.experiment.searched)
     printed = case.published.identified
     bounds = bounds_at_truth(case, target)
     drawn, grid = style.row_of_panels(len(bounds), 3.1)

@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
+import biogrip_study.records.identifications as records
 from biogrip.arrays import Array
 from biogrip.digits import with_unit
 from biogrip.figures import style
@@ -27,13 +28,6 @@ from biogrip_study.figures.case_fit import (
     seeds_in_words,
 )
 from biogrip_study.methods.registry import METHODS
-from biogrip_study.records.identifications import (
-    near_noise,
-    near_noise_words,
-    read_identifications,
-    read_verdicts,
-    values_by_quantity,
-)
 from biogrip_study.records.traces import read_target
 
 # End of the axis of identified over target values.
@@ -63,8 +57,8 @@ def draw_overview(
     style.panel(axes[0], "a", cases[0].title)
     files = zip(axes[1:], cases, identifications, expected, strict=True)
     for index, (scatter, case, path, judged) in enumerate(files):
-        identified = read_identifications(path, case, study.shown_method.name)
-        quantities = read_verdicts(judged)["quantities"]
+        identified = records.read_identifications(path, case, study.shown_method.name)
+        quantities = records.read_verdicts(judged)["quantities"]
         bounded = {item["quantity"] for item in quantities if item["verdict"] != BOUNDED_ABOVE}
         _draw_ratios(scatter, case, first_seeds(identified), bounded)
         scatter.tick_params(labelleft=index == 0)
@@ -82,9 +76,9 @@ def draw_overview(
 
 def _draw_ratios(axes: Axes, case: Case, fits: pd.DataFrame, bounded: set[str]) -> None:
     """Draw identified over target values of what is determined or bounded below."""
-    reached = near_noise(fits, tolerance := case.study.near_noise_tolerance)
+    reached = records.near_noise(fits, tolerance := case.study.near_noise_tolerance)
     looks = {
-        f"fit {near_noise_words(tolerance)}": (reached, style.FITTED),
+        f"fit {records.near_noise_words(tolerance)}": (reached, style.FITTED),
         "other fits": (~reached, style.ALL_SEEDS),
     }
     for label, (_, color) in looks.items():
@@ -94,7 +88,7 @@ def _draw_ratios(axes: Axes, case: Case, fits: pd.DataFrame, bounded: set[str]) 
     if case.published.identified:
         axes.plot([], [], color=style.PAPER, label="paper")
     ticks: list[str] = []
-    found = values_by_quantity(fits, case.sample.model)
+    found = records.values_by_quantity(fits, case.sample.model)
     for quantity in parameters_and_sum(case.sample.model):
         label, values = quantity.label, found[quantity.label]
         target = quantity_value(label, case.parameters)
@@ -118,7 +112,7 @@ def _draw_ratios(axes: Axes, case: Case, fits: pd.DataFrame, bounded: set[str]) 
 def draw_answer(study: Study, verdicts: Path, measurements: Path) -> Figure:
     """Draw a gripper, the judged trace of the only case, and what it tells of two dampers."""
     (case,) = study.cases.values()
-    judged = read_verdicts(verdicts)
+    judged = records.read_verdicts(verdicts)
     items = {item["quantity"]: item for item in judged["quantities"]}
     drawn = style.figure(style.COLUMN_IN, 3.4)
     (device, trace), profiles = drawn.subplots(2, 2)
@@ -190,10 +184,10 @@ def _draw_moduli_of_case(
     # The first method, and least squares if the study has it.
     names = dict.fromkeys([*study.config.methods[:1], "least_squares"])
     for method in [METHODS[name] for name in names if name in study.config.methods]:
-        runs = first_seeds(read_identifications(identified, case, method.name))
+        runs = first_seeds(records.read_identifications(identified, case, method.name))
         fits = runs[[p.column for p in model.parameters]].to_numpy(float)
         moduli = _modulus(model.network(fits), omega)
-        near.append(moduli[near_noise(runs, study.near_noise_tolerance)])
+        near.append(moduli[records.near_noise(runs, study.near_noise_tolerance)])
         look: dict[str, Any] = {"color": style.COLORS[method.color], "alpha": 0.45}
         axes.plot(omega, moduli.real.T, linewidth=0.4, **look)
         axes.plot(omega, moduli.imag.T, "--", linewidth=0.4, **look)

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+import biogrip_study.records.identifications as records
 from biogrip.arrays import parts
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.nested_fits import fit_models
@@ -23,14 +24,6 @@ from biogrip.terminal import Progress
 from biogrip_study.config.study import Case
 from biogrip_study.methods.genome import lowest_encodable
 from biogrip_study.methods.registry import identify_by
-from biogrip_study.records.identifications import (
-    ENCODABLE,
-    MODEL_FITS,
-    history_of,
-    identification_columns,
-    read_batch,
-    row_of,
-)
 from biogrip_study.records.rows import join_arrays, read_arrays, write_arrays
 from biogrip_study.records.traces import Measurements, read_measurements
 
@@ -63,10 +56,10 @@ def identify_seeds(
         answers = identified(problems, rngs, progress.within)
         for seed, trace, answer in zip(group, traces, answers, strict=True):
             noise = None if recorded.target is None else rms(trace - recorded.target)
-            rows.append((case.name, method, seed, *row_of(experiment, answer, noise)))
-            histories.append(history_of(method, seed, experiment, answer))
+            rows.append((case.name, method, seed, *records.row_of(experiment, answer, noise)))
+            histories.append(records.history_of(method, seed, experiment, answer))
         progress.done(len(group))
-    write_rows(parameters, identification_columns(experiment.model), rows)
+    write_rows(parameters, records.identification_columns(experiment.model), rows)
     write_arrays(history, join_arrays(histories))
 
 
@@ -83,7 +76,7 @@ def join(
     It is looked for around the end of every run, since these surround the continuous optimum.
     """
     for batch in batches:
-        read_batch(batch, case)
+        records.read_batch(batch, case)
     rows = [row for batch in batches for row in read_table(batch)]
     searched = case.experiment.searched.parameters
     ends = defaultdict(list)
@@ -99,9 +92,9 @@ def join(
         for seed, of_trace in zip(map(str, traces), posed, strict=True):
             misfit = lowest_encodable(of_trace.residuals.misfit, ranges, np.array(ends[seed]))
             lowest[seed] = f"{misfit:.6e}"
-    header = identification_columns(case.sample.model)
+    header = records.identification_columns(case.sample.model)
     joined = ([*map(row.get, header), lowest.get(row["seed"], "")] for row in rows)
-    write_rows(identifications, (*header, ENCODABLE), joined)
+    write_rows(identifications, (*header, records.ENCODABLE), joined)
     write_arrays(history, join_arrays([read_arrays(batch) for batch in histories]))
 
 
@@ -127,7 +120,7 @@ def fit(case: Case, seeds: Sequence[int], measurements: Path, fits: Path) -> Non
                 (case.name, name, seed, *sizes, f"{answer.misfit:.8e}")
                 for seed, answer in zip(group, answers.values(), strict=True)
             ]
-    MODEL_FITS.write(fits, rows)
+    records.MODEL_FITS.write(fits, rows)
 
 
 def experiment_for(experiment: Experiment, measurements: Measurements) -> Experiment:

@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 from scipy.special import betaincinv
 
+import biogrip_study.records.identifications as records
 from biogrip.fit.nested_fits import aic_and_bic
 from biogrip.judging.likelihood import least_sd
 from biogrip.judging.quantities import parameters_and_sum, quantity_value
@@ -15,16 +16,6 @@ from biogrip.levels import WIDE
 from biogrip.physics.noise import standard_deviation
 from biogrip_study.config.study import Case, Study
 from biogrip_study.methods.registry import METHODS
-from biogrip_study.records.identifications import (
-    ENCODABLE,
-    INTERVALS,
-    MODEL_FITS,
-    chi_square_increase,
-    reached_encodable,
-    read_identifications,
-    share_with_limits,
-    values_by_quantity,
-)
 from biogrip_study.records.rows import require_rows, seeds_of
 from biogrip_study.records.traces import read_target
 from biogrip_study.tables.cases import error_percent
@@ -46,10 +37,10 @@ def methods(study: Study, identifications: list[Path]) -> ShownTable:
     rows = []
     labels = {}
     for (name, case), path in zip(study.cases.items(), identifications, strict=True):
-        identified = read_identifications(path, case)
-        identified["increase"] = chi_square_increase(identified, case)
-        identified["least"] = chi_square_increase(identified, case, ENCODABLE)
-        identified["reached"] = reached_encodable(identified, case)
+        identified = records.read_identifications(path, case)
+        identified["increase"] = records.chi_square_increase(identified, case)
+        identified["least"] = records.chi_square_increase(identified, case, records.ENCODABLE)
+        identified["reached"] = records.reached_encodable(identified, case)
         for method, mine in identified.groupby("method", sort=False):
             row: Row = {
                 "case": name,
@@ -59,9 +50,9 @@ def methods(study: Study, identifications: list[Path]) -> ShownTable:
                 "encodable_rise": mine["least"].median(),
                 "median_evaluations": mine["evaluations"].median(),
             }
-            shares = share_with_limits(int(mine["reached"].sum()), len(mine))
+            shares = records.share_with_limits(int(mine["reached"].sum()), len(mine))
             row |= zip(("reached_share", "reached_low", "reached_high"), shares, strict=True)
-            for label, values in values_by_quantity(mine, case.sample.model).items():
+            for label, values in records.values_by_quantity(mine, case.sample.model).items():
                 error = error_percent(quantity_value(label, case.parameters), values)
                 row[f"error_percent {label}"] = abs(error).median()
                 labels[f"error_percent {label}"] = f"Error {label} %"
@@ -118,7 +109,9 @@ def models(study: Study, fits: list[Path]) -> ShownTable:
 def read_fits(study: Study, path: Path) -> pd.DataFrame:
     """Read the fits of every model of a case, in the seeds of a batch."""
     case = study.cases[path.parent.name]
-    return MODEL_FITS.read(path, case=[case.name], model=case.models, seed=seeds_of(path.stem))
+    return records.MODEL_FITS.read(
+        path, case=[case.name], model=case.models, seed=seeds_of(path.stem)
+    )
 
 
 _COVERAGE_COLUMNS = (
@@ -207,7 +200,7 @@ def read_intervals(study: Study, path: Path) -> pd.DataFrame:
 
     Seeds that are judged in full have all quantities.
     """
-    case, frame = study.cases[path.parent.name], INTERVALS.read(path)
+    case, frame = study.cases[path.parent.name], records.INTERVALS.read(path)
     every = [quantity.label for quantity in parameters_and_sum(case.experiment.searched)]
     estimated = frame.loc[frame["estimate_rest_known"].notna(), "quantity"].unique()
     often = case.block.identifiability.verdicts_every

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+import biogrip_study.records.identifications as records
 from biogrip.arrays import BoolArray
 from biogrip.judging.likelihood import bounds_percent, headlines
 from biogrip.judging.quantities import Quantity, quantity_value
@@ -21,12 +22,6 @@ from biogrip_study.config.study import Case, Study
 from biogrip_study.config.study_blocks import AxisBlock
 from biogrip_study.methods.genome import nearest_encodable
 from biogrip_study.methods.registry import METHODS
-from biogrip_study.records.identifications import (
-    near_noise,
-    near_noise_words,
-    read_batch,
-    values_by_quantity,
-)
 from biogrip_study.records.rows import RowFile
 from biogrip_study.tables.cases import error_percent
 from biogrip_study.tables.layout import Column, Row, ShownTable
@@ -62,7 +57,7 @@ def judge_points(study: Study, sweep: str, identifications: list[Path], points: 
         for point, method in product(grid, study.config.methods):
             case = study.points[point.name]
             batches = [file for file in identifications if file.parts[-3:-1] == (case.name, method)]
-            runs = pd.concat([read_batch(file, case) for file in batches])
+            runs = pd.concat([records.read_batch(file, case) for file in batches])
             if case.noise.absent:
                 # Without noise, the misfit of the true values rounded to the genes' digits.
                 runs = runs.assign(noise_rms=_resolution(case, true))
@@ -80,12 +75,12 @@ def _judged(
     heads: list[str],
 ) -> Iterator[tuple[str | int, ...]]:
     """Yield quantity, number of runs, shares, median errors and bound in percent."""
-    found = values_by_quantity(runs, point.experiment.searched)
+    found = records.values_by_quantity(runs, point.experiment.searched)
     inside = np.ones(len(runs), dtype=bool)
     for quantity, percent in bounds:
         if (label := quantity.label) in heads:
             inside &= in_basin(found[label], quantity_value(label, true), percent / 100)
-    near = np.mean(near_noise(runs, point.study.near_noise_tolerance))
+    near = np.mean(records.near_noise(runs, point.study.near_noise_tolerance))
     shares = near, np.mean(inside) if heads else np.nan
     for quantity, percent in bounds:
         truth = quantity_value(quantity.label, true)
@@ -154,7 +149,7 @@ def robustness(study: Study, sweep: str, points: Path) -> ShownTable:
                 for method, values in at_point.set_index("method").iterrows():
                     row |= {f"{to}_{method}": values[of] for of, (to, _) in _BY_METHOD.items()}
                 rows.append(row)
-    words = near_noise_words(study.near_noise_tolerance)
+    words = records.near_noise_words(study.near_noise_tolerance)
     columns = (
         Column("case", "Case"),
         Column("row", _axis_heading(study, block.rows)),
