@@ -18,7 +18,7 @@ from biogrip.figures import style
 from biogrip.judging.quantities import parameters_and_sum, quantity_value
 from biogrip.judging.verdicts import DETERMINED
 from biogrip_study.config.study import Case
-from biogrip_study.figures.case_fit import SHOWN_SEEDS, first_of_basins, seeds_in_words
+from biogrip_study.figures.case_fit import SHOWN_SEEDS, draw_runs, first_of_basins, seeds_in_words
 from biogrip_study.methods.registry import METHODS
 from biogrip_study.tables.study import bounds_at_truth
 
@@ -149,11 +149,6 @@ def draw_waterfall(case: Case, identifications: Path) -> Figure:
 # Bounds on both sides of 1 that an axis shows, more where quartiles are further off; where that
 # leaves no room above zero, it shows decades.
 _WIDTHS, _LOOSE, _MOST_DECADES = 8.0, 0.95, 4
-# Points at the edge would make the layout leave them room.
-_DOTS: dict[str, Any] = {
-    "linestyle": "", "marker": "o", "markersize": 2, "markeredgewidth": 0, "alpha": 0.55,
-    "clip_on": False, "in_layout": False,
-}  # fmt: skip
 _PAPER: dict[str, Any] = {"color": style.PAPER, "linestyle": (0, (4, 2))}
 
 
@@ -198,12 +193,8 @@ def _draw_ratios(axes: Axes, case: Case, of_methods: Mapping[str, Array], limit:
     decades = float(np.clip(np.ceil(np.max(np.abs(ends))), 1, _MOST_DECADES))
     bottom, top = (10**-decades, 10**decades) if loose else (1 - reach, 1 + reach)
     for place, (name, ratios) in enumerate(of_methods.items()):
-        shown = ratios[:SHOWN_SEEDS]
-        # A fixed sideways scatter keeps points apart.
-        x = place + 0.6 * ((np.arange(len(shown)) * 0.618034) % 1 - 0.5)
-        look = _DOTS | {"color": style.COLORS[METHODS[name].color]}
-        limits = (-np.inf, bottom), (np.inf, top)
-        style.points_within(axes, np.column_stack([x, shown]), *limits, look, edge_size=3)
+        color = style.COLORS[METHODS[name].color]
+        draw_runs(axes, place, ratios[:SHOWN_SEEDS], (bottom, top), color)
         low, middle, high = np.clip(quartiles[place], bottom, top)
         axes.plot([place, place], [low, high], color=style.TARGET, linewidth=1.0)
         axes.plot([place - 0.3, place + 0.3], [middle, middle], color=style.TARGET, linewidth=1.4)

@@ -21,7 +21,9 @@ from biogrip.physics.noise import standard_deviation
 from biogrip.physics.sample_model import Network, complex_modulus
 from biogrip_study.config.study import Case, Study
 from biogrip_study.figures.case_fit import (
+    DOTS,
     SHOWN_SEEDS,
+    draw_runs,
     first_seeds,
     fits_of_basins,
     judged_fit,
@@ -33,9 +35,6 @@ from biogrip_study.records.traces import read_target
 # End of the axis of identified over target values.
 _WORST = 1e3
 _TITLE_LETTERS = 19
-_DOTS: dict[str, Any] = {
-    "linestyle": "", "marker": "o", "markersize": 2.2, "markeredgewidth": 0, "alpha": 0.55
-}  # fmt: skip
 
 
 def draw_overview(
@@ -82,7 +81,7 @@ def _draw_ratios(axes: Axes, case: Case, fits: pd.DataFrame, bounded: set[str]) 
         "other fits": (~reached, style.ALL_SEEDS),
     }
     for label, (_, color) in looks.items():
-        axes.plot([], [], **_DOTS | {"color": color}, label=label)
+        axes.plot([], [], **DOTS | {"color": color}, label=label)
     axes.plot([], [], "^", color=style.TARGET, markersize=1.6, label="beyond the axis")
     axes.axhline(1, color=style.TARGET, linewidth=0.8, label="truth")
     if case.published.identified:
@@ -96,12 +95,9 @@ def _draw_ratios(axes: Axes, case: Case, fits: pd.DataFrame, bounded: set[str]) 
             continue
         x = len(ticks)
         ticks.append(quantity.symbol.replace(" ", ""))
-        place = x + 0.5 * ((np.arange(len(values)) * 0.618034) % 1 - 0.5)
-        points = np.column_stack([place, values / target])
+        ratios = values.to_numpy(float) / target
         for which, color in reversed(looks.values()):
-            limits = (-np.inf, 1 / _WORST), (np.inf, _WORST)
-            look = _DOTS | {"color": color}
-            style.points_within(axes, points[which], *limits, look, edge_size=3.5)
+            draw_runs(axes, x, ratios[which], (1 / _WORST, _WORST), color)
         if (paper := quantity_value(label, case.published.identified)) is not None:
             shown = np.clip(paper / target, 1 / _WORST, _WORST)
             axes.plot([x - 0.4, x + 0.4], [shown, shown], color=style.PAPER)
