@@ -50,7 +50,7 @@ def first_of_basins(identified: pd.DataFrame, case: Case) -> dict[str, pd.Series
         return {"the only trace": identified.iloc[0]}
     return {
         f"seed {runs['seed'].iloc[0]}" + f", {name}" * (name != ALL): runs.iloc[0]
-        for name, runs in basins(identified, case.study.near_noise_tolerance).items()
+        for name, runs in basins(identified, case.study).items()
     }
 
 

@@ -64,7 +64,7 @@ def _draw_seeds(
 
 def draw_convergence(case: Case, identifications: Path, history: Path) -> Figure:
     """Draw each seed's excess of the misfit over its noise, highlighting a run of each basin."""
-    method, tolerance = case.study.shown_method, case.study.near_noise_tolerance
+    method = case.study.shown_method
     identified, histories, looks = _runs(case, identifications, history, ["best_misfit"])
     noise = identified.set_index("seed")["noise_rms"]
     noisy = bool((noise > 0).all())
@@ -81,9 +81,9 @@ def draw_convergence(case: Case, identifications: Path, history: Path) -> Figure
         axes.axvline(start, linestyle=":", label="mutation starts", **line)
     title = case.title
     if noisy:
-        words = records.near_noise_words(tolerance)
-        axes.axhline(100 * tolerance, linestyle="-.", label=words, **line)
-        reached = records.near_noise(identified, tolerance).sum()
+        words = records.near_noise_words(case.study)
+        axes.axhline(100 * case.study.near_noise_tolerance, linestyle="-.", label=words, **line)
+        reached = records.near_noise(identified, case.study).sum()
         title += f": {reached} of {len(identified)} {words}"
     axes.set_yscale("symlog", linthresh=1, linscale=0.5)
     axes.yaxis.set_major_formatter("{x:g}")

@@ -75,9 +75,9 @@ def draw_overview(
 
 def _draw_ratios(axes: Axes, case: Case, fits: pd.DataFrame, bounded: set[str]) -> None:
     """Draw identified over target values of what is determined or bounded below."""
-    reached = records.near_noise(fits, tolerance := case.study.near_noise_tolerance)
+    reached = records.near_noise(fits, case.study)
     looks = {
-        f"fit {records.near_noise_words(tolerance)}": (reached, style.FITTED),
+        f"fit {records.near_noise_words(case.study)}": (reached, style.FITTED),
         "other fits": (~reached, style.ALL_SEEDS),
     }
     for label, (_, color) in looks.items():
@@ -183,7 +183,7 @@ def _draw_moduli_of_case(
         runs = first_seeds(records.read_identifications(identified, case, method.name))
         fits = runs[[p.column for p in model.parameters]].to_numpy(float)
         moduli = _modulus(model.network(fits), omega)
-        near.append(moduli[records.near_noise(runs, study.near_noise_tolerance)])
+        near.append(moduli[records.near_noise(runs, study)])
         look: dict[str, Any] = {"color": style.COLORS[method.color], "alpha": 0.45}
         axes.plot(omega, moduli.real.T, linewidth=0.4, **look)
         axes.plot(omega, moduli.imag.T, "--", linewidth=0.4, **look)

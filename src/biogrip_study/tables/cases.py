@@ -40,24 +40,23 @@ _BASINS = (
 )
 
 
-def _error_columns(near_noise_tolerance: float) -> tuple[Column, ...]:
-    share = f"Share {records.near_noise_words(near_noise_tolerance)}"
+def _error_columns(study: Study) -> tuple[Column, ...]:
+    share = f"Share {records.near_noise_words(study)}"
     ends = (Column(f"near_noise_{end}", f"95 % {end}", 2) for end in ("from", "to"))
     return (*_ERROR_COLUMNS, Column("near_noise_share", share, 2), *ends)
 
 
 def errors_of_case(case: Case, identifications: Path) -> ShownTable:
     """Compare target and identified values of one case, given its identifications, CSV."""
-    tolerance = case.study.near_noise_tolerance
     identified = records.read_identifications(identifications, case, case.study.shown_method.name)
     of_case: Row = {"case": case.name}
     if identified["noise_rms"].notna().all():
         near = records.share_with_limits(
-            int(records.near_noise(identified, tolerance).sum()), len(identified)
+            int(records.near_noise(identified, case.study).sum()), len(identified)
         )
         of_case |= zip((f"near_noise_{end}" for end in ("share", "from", "to")), near, strict=True)
     rows = []
-    for basin, runs in ({records.ALL: identified} | records.basins(identified, tolerance)).items():
+    for basin, runs in ({records.ALL: identified} | records.basins(identified, case.study)).items():
         found = records.values_by_quantity(runs, case.sample.model)
         for quantity in parameters_and_sum(case.sample.model):
             values, target = found[quantity.label], quantity_value(quantity.label, case.parameters)
@@ -80,7 +79,7 @@ def errors_of_case(case: Case, identifications: Path) -> ShownTable:
         if case.parameters
         else f"{case.title}: parameters identified in the recorded trace."
     )
-    return ShownTable(caption, _error_columns(tolerance), rows)
+    return ShownTable(caption, _error_columns(case.study), rows)
 
 
 def error_percent(target: float | None, identified: Any) -> Any:
@@ -110,7 +109,7 @@ def errors(study: Study, identifications: list[Path]) -> ShownTable:
         # Text, as ">100", stays; not every case or parameter has one.
         with suppress(ValueError, TypeError, KeyError):
             row["paper_error_percent"] = float(row["paper_error_percent"])
-    columns = _error_columns(study.near_noise_tolerance)
+    columns = _error_columns(study)
     return ShownTable(f"Identification errors of all cases. {_BASINS}", columns, rows)
 
 

@@ -80,7 +80,7 @@ def _judged(
     for quantity, percent in bounds:
         if (label := quantity.label) in heads:
             inside &= in_basin(found[label], quantity_value(label, true), percent / 100)
-    near = np.mean(records.near_noise(runs, point.study.near_noise_tolerance))
+    near = np.mean(records.near_noise(runs, point.study))
     shares = near, np.mean(inside) if heads else np.nan
     for quantity, percent in bounds:
         truth = quantity_value(quantity.label, true)
@@ -135,21 +135,19 @@ _CAPTION = (
 def robustness(study: Study, sweep: str, points: Path) -> ShownTable:
     """Return a row for each point of a sweep and the best and worst determined quantity."""
     block, frame = study.config.sweeps[sweep], POINTS.read(points)
-    frame["case"] = frame["point"].str.partition("--")[0]
     silent = frame["bound_percent"].isna()
     frame.loc[silent, _ERRORS] = frame.loc[silent, _ERRORS].clip(lower=_LEAST_PERCENT)
     rows: list[Row] = []
-    for case in block.cases:
-        of_case = frame[frame["case"] == case]
+    for case, of_case in frame.groupby(frame["point"].str.partition("--")[0], sort=False):
         first = of_case[of_case["method"] == study.shown_method.name]
         for quantity in headlines([*zip(first["quantity"], first["bound_percent"], strict=True)]):
             chosen = of_case[of_case["quantity"] == quantity]
             for _, at_point in chosen.groupby("point", sort=False):
-                row = at_point.iloc[0].to_dict()
+                row = {"case": case, **at_point.iloc[0]}
                 for method, values in at_point.set_index("method").iterrows():
                     row |= {f"{to}_{method}": values[of] for of, (to, _) in _BY_METHOD.items()}
                 rows.append(row)
-    words = records.near_noise_words(study.near_noise_tolerance)
+    words = records.near_noise_words(study)
     columns = (
         Column("case", "Case"),
         Column("row", _axis_heading(study, block.rows)),
