@@ -20,15 +20,7 @@ from biogrip.judging.verdicts import BOUNDED_ABOVE
 from biogrip.physics.noise import standard_deviation
 from biogrip.physics.sample_model import Network, complex_modulus
 from biogrip_study.config.study import Case, Study
-from biogrip_study.figures.case_fit import (
-    DOTS,
-    SHOWN_SEEDS,
-    draw_runs,
-    first_seeds,
-    fits_of_basins,
-    judged_fit,
-    seeds_in_words,
-)
+from biogrip_study.figures import case_fit
 from biogrip_study.methods.registry import METHODS
 from biogrip_study.records.traces import read_target
 
@@ -47,7 +39,7 @@ def draw_overview(
     cases = list(study.cases.values())
     drawn = style.figure(style.PAGE_IN, 3.0)
     axes = drawn.subplots(1, 1 + len(cases), width_ratios=[2] + [1.05] * len(cases))
-    fits = fits_of_basins(cases[0], identifications[0], measurements)
+    fits = case_fit.fits_of_basins(cases[0], identifications[0], measurements)
     factor, _ = draw_traces(axes[0], fits)
     fit = next(iter(fits.values()))
     axes[0].set_ylim(top=1.65 * factor * fit.measured.max())
@@ -59,7 +51,7 @@ def draw_overview(
         identified = records.read_identifications(path, case, study.shown_method.name)
         quantities = records.read_verdicts(judged)["quantities"]
         bounded = {item["quantity"] for item in quantities if item["verdict"] != BOUNDED_ABOVE}
-        _draw_ratios(scatter, case, first_seeds(identified), bounded)
+        _draw_ratios(scatter, case, case_fit.first_seeds(identified), bounded)
         scatter.tick_params(labelleft=index == 0)
         style.panel(scatter, "bcd"[index], case.title, most_letters=_TITLE_LETTERS)
     axes[1].set_ylabel("identified / target")
@@ -68,7 +60,9 @@ def draw_overview(
         loc="outside lower right",
         ncols=5,
         markerscale=2.5,
-        title=seeds_in_words(len(identified)) if len(identified) > SHOWN_SEEDS else None,
+        title=case_fit.seeds_in_words(len(identified))
+        if len(identified) > case_fit.SHOWN_SEEDS
+        else None,
     )
     return drawn
 
@@ -81,7 +75,7 @@ def _draw_ratios(axes: Axes, case: Case, fits: pd.DataFrame, bounded: set[str]) 
         "other fits": (~reached, style.ALL_SEEDS),
     }
     for label, (_, color) in looks.items():
-        axes.plot([], [], **DOTS | {"color": color}, label=label)
+        axes.plot([], [], **case_fit.DOTS | {"color": color}, label=label)
     axes.plot([], [], "^", color=style.TARGET, markersize=1.6, label="beyond the axis")
     axes.axhline(1, color=style.TARGET, linewidth=0.8, label="truth")
     if case.published.identified:
@@ -97,7 +91,7 @@ def _draw_ratios(axes: Axes, case: Case, fits: pd.DataFrame, bounded: set[str]) 
         ticks.append(quantity.symbol.replace(" ", ""))
         ratios = values.to_numpy(float) / target
         for which, color in reversed(looks.values()):
-            draw_runs(axes, x, ratios[which], (1 / _WORST, _WORST), color)
+            case_fit.draw_runs(axes, x, ratios[which], (1 / _WORST, _WORST), color)
         if (paper := quantity_value(label, case.published.identified)) is not None:
             shown = np.clip(paper / target, 1 / _WORST, _WORST)
             axes.plot([x - 0.4, x + 0.4], [shown, shown], color=style.PAPER)
@@ -114,7 +108,7 @@ def draw_answer(study: Study, verdicts: Path, measurements: Path) -> Figure:
     (device, trace), profiles = drawn.subplots(2, 2)
     _device(device)
     style.panel(device, "1", "two arms squeeze")
-    fit = judged_fit(case, judged, measurements)
+    fit = case_fit.judged_fit(case, judged, measurements)
     factor, unit = draw_traces(trace, {"fit": fit})
     trace.set_ylim(top=1.45 * factor * fit.measured.max())
     trace.set(xlabel="time (s)", ylabel=with_unit("rotation", unit))
@@ -180,7 +174,7 @@ def _draw_moduli_of_case(
     # The first method, and least squares if the study has it.
     names = dict.fromkeys([*study.config.methods[:1], "least_squares"])
     for method in [METHODS[name] for name in names if name in study.config.methods]:
-        runs = first_seeds(records.read_identifications(identified, case, method.name))
+        runs = case_fit.first_seeds(records.read_identifications(identified, case, method.name))
         fits = runs[[p.column for p in model.parameters]].to_numpy(float)
         moduli = _modulus(model.network(fits), omega)
         near.append(moduli[records.near_noise(runs, study)])
