@@ -69,10 +69,7 @@ def fits_of_basins(
 
 
 def _fit_of_seed(
-    case: Case,
-    seed: int,
-    values: Mapping[str, float],
-    measurements: Path,
+    case: Case, seed: int, values: Mapping[str, float], measurements: Path
 ) -> FittedTrace:
     made = read_measurements(measurements, [seed])
     experiment = experiment_for(case.experiment, made)

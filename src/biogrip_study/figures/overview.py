@@ -30,10 +30,7 @@ _TITLE_LETTERS = 19
 
 
 def draw_overview(
-    study: Study,
-    identifications: list[Path],
-    expected: list[Path],
-    measurements: list[Path],
+    study: Study, identifications: list[Path], expected: list[Path], measurements: list[Path]
 ) -> Figure:
     """Draw a fit of each basin of the first case, and identified over target values of some."""
     cases = list(study.cases.values())

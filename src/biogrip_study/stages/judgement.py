@@ -92,11 +92,7 @@ _GROUPS_AT_ONCE = 2
 
 
 def estimate_intervals(
-    case: Case,
-    seeds: Sequence[int],
-    target: Path,
-    expected: Path,
-    intervals: Path,
+    case: Case, seeds: Sequence[int], target: Path, expected: Path, intervals: Path
 ) -> None:
     """Fit a batch of seeds, and compute intervals of what `expected` verdicts call determined.
 
