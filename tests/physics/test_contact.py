@@ -153,7 +153,7 @@ def test_calibration_is_written_and_read_back(tmp_path: Path) -> None:
     path, nominal = tmp_path / "gripper.yaml", STUDY.case("endothelial_cell").experiment
     both = ({"left": arm, "right": arm} for arm in (found, uncertainty))
     path.write_text(calibration.calibration_yaml(*both))
-    read = calibration.with_calibration(nominal, [path])
+    read = calibration.with_calibration(nominal, path)
     expected = uncertainty.stiffness_Nm_per_rad
     known = read.uncertainty["left"]["stiffness_Nm_per_rad"]
     assert known == pytest.approx(expected, rel=0.05)
@@ -161,7 +161,7 @@ def test_calibration_is_written_and_read_back(tmp_path: Path) -> None:
     np.testing.assert_allclose(arms[0], arms[1], rtol=1e-6)
     path.write_text("gripper: {left: 3}")
     with pytest.raises(BiogripError, match="cannot be read as a calibration"):
-        calibration.with_calibration(nominal, [path])
+        calibration.with_calibration(nominal, path)
 
 
 def test_closing_onto_a_sample_leaves_less_stroke() -> None:

@@ -63,7 +63,7 @@ def test_all_stages_weight_the_readings_of_a_recorded_trace(tmp_path: Path) -> N
     mine = f"cases: {{mine: {{sample: {{model: liquid_drop}}, measurement: {keys}}}}}"
     case = study_of(mine).cases["mine"]
     target.record(case, EXAMPLE, tmp_path / "t.npz")
-    found = experiment_for(case.experiment, read_measurements(tmp_path / "t.npz", [0]), [])
+    found = experiment_for(case.experiment, read_measurements(tmp_path / "t.npz", [0]))
     assert found.sd is not None
     assert found.noise_sd == pytest.approx(np.sqrt(np.mean(found.sd**2)))
 
@@ -71,7 +71,7 @@ def test_all_stages_weight_the_readings_of_a_recorded_trace(tmp_path: Path) -> N
 def test_without_noise_the_fit_is_the_truth_and_not_the_rounding_of_digits(tmp_path: Path) -> None:
     case, file = STUDY.case("endothelial_cell"), tmp_path / "expected.json"
     target.simulate_target(case, tmp_path / "target.csv")
-    expect(case, tmp_path / "target.csv", [], file)
+    expect(case, tmp_path / "target.csv", file)
     found = json.loads(file.read_text())
     values = {each["quantity"]: each["value"] for each in found["quantities"]}
     # The damper that is not there has the lower end of its search range.
@@ -84,7 +84,7 @@ def test_of_a_target_of_another_sample_its_parameters_are_expected(tmp_path: Pat
     case, file = STUDY.case("endothelial_cell"), tmp_path / "expected.json"
     stiffer = study_of("cases: {endothelial_cell: {sample: {k: 35.2}}}").case("endothelial_cell")
     target.simulate_target(stiffer, tmp_path / "target.csv")
-    expect(case, tmp_path / "target.csv", [], file)
+    expect(case, tmp_path / "target.csv", file)
     values = {row["quantity"]: row["value"] for row in json.loads(file.read_text())["quantities"]}
     # Fits leave out the inertia that targets have; 35.0 is off by 6e-3.
     assert values["k"] == pytest.approx(35.2, rel=3e-3)

@@ -445,7 +445,7 @@ def read_reading(study: Study, compared: pd.DataFrame | None, file: Path) -> pd.
         compared is not None
         and title in compared.loc[compared["verdict"] == EXCLUDED, "reading"].to_numpy()
     )
-    near = near_noise(found, study.near_noise_tolerance)
+    near = near_noise(found, study)
     return found.assign(near_noise=near, judging=not excluded, reading=title)
 
 
@@ -504,7 +504,7 @@ def read_runs(case: Case, identifications: Path, histories: Path) -> dict[str, p
     best = read_histories(histories, "genetic", ["best_misfit", *names]).rename(columns=names)
     change = best.groupby("seed")["best_misfit"].diff()
     falls = best["generation"].where(change < 0, 0).groupby(best["seed"]).max()
-    found["near_noise"] = near_noise(found, case.study.near_noise_tolerance)
+    found["near_noise"] = near_noise(found, case.study)
     found = found.assign(last_improvement=found["seed"].map(falls))
     # Of a run that has stopped before, the last generation.
     at_20 = best[best["generation"] <= 20].groupby("seed", as_index=False).last()

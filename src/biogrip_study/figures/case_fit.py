@@ -6,8 +6,10 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from biogrip.arrays import Array
 from biogrip.figures import style
 from biogrip.figures.fit import FittedTrace, draw_fit, fit_of, scale_of
 from biogrip.figures.likelihood import draw_profiles_of
@@ -24,18 +26,36 @@ SHOWN_SEEDS = 100
 """Most seeds drawn individually; figures show the first ones."""
 
 
+DOTS: dict[str, Any] = {
+    "linestyle": "", "marker": "o", "markersize": 2.2, "markeredgewidth": 0, "alpha": 0.55,
+    "clip_on": False, "in_layout": False,
+}  # fmt: skip
+"""Look of runs; points at the edge would make the layout leave them room."""
+
+
+def draw_runs(
+    axes: Axes, place: float, values: Array, ends: tuple[float, float], color: str
+) -> None:
+    """Draw values of runs, (n,), about a place, and triangles at the edge for those beyond."""
+    # A fixed sideways scatter keeps points apart.
+    sideways = place + 0.6 * ((np.arange(len(values)) * 0.618034) % 1 - 0.5)
+    low, high = (-np.inf, ends[0]), (np.inf, ends[1])
+    points, look = np.column_stack((sideways, values)), DOTS | {"color": color}
+    style.points_within(axes, points, low, high, look, edge_size=3)
+
+
 def first_of_basins(identified: pd.DataFrame, case: Case) -> dict[str, pd.Series]:
     """Return the first run of each of the `basins`, by what it is called in a legend."""
     if len(identified) == 1:
         return {"the only trace": identified.iloc[0]}
     return {
         f"seed {runs['seed'].iloc[0]}" + f", {name}" * (name != ALL): runs.iloc[0]
-        for name, runs in basins(identified, case.study.near_noise_tolerance).items()
+        for name, runs in basins(identified, case.study).items()
     }
 
 
 def fits_of_basins(
-    case: Case, identifications: Path, measurements: list[Path], calibrated: list[Path]
+    case: Case, identifications: Path, measurements: list[Path]
 ) -> dict[str, FittedTrace]:
     """Return the fit of the first run of each basin, by label, from files of a case."""
     identified = read_identifications(identifications, case, case.study.shown_method.name)
@@ -44,19 +64,15 @@ def fits_of_basins(
         seed = int(run["seed"])
         values = {p.name: float(run[p.column]) for p in case.sample.model.parameters}
         holding = next(path for path in measurements if seed in seeds_of(path.stem))
-        fits[f"fit ({words})"] = _fit_of_seed(case, seed, values, holding, calibrated)
+        fits[f"fit ({words})"] = _fit_of_seed(case, seed, values, holding)
     return fits
 
 
 def _fit_of_seed(
-    case: Case,
-    seed: int,
-    values: Mapping[str, float],
-    measurements: Path,
-    calibrated: list[Path],
+    case: Case, seed: int, values: Mapping[str, float], measurements: Path
 ) -> FittedTrace:
     made = read_measurements(measurements, [seed])
-    experiment = experiment_for(case.experiment, made, calibrated)
+    experiment = experiment_for(case.experiment, made)
     return fit_of(
         experiment, values, made.time_s, made.readings[seed], made.known.get("sd"), made.target
     )
@@ -74,19 +90,15 @@ def seeds_in_words(count: int) -> str:
     return f"all {count} seeds" if count <= SHOWN_SEEDS else f"first {SHOWN_SEEDS} of {count} seeds"
 
 
-def draw_fits(
-    case: Case, identifications: Path, measurements: list[Path], calibrated: list[Path]
-) -> Figure:
+def draw_fits(case: Case, identifications: Path, measurements: list[Path]) -> Figure:
     """Draw the fit of the first run in each basin, beside the trace of the first of these."""
-    fits = fits_of_basins(case, identifications, measurements, calibrated)
+    fits = fits_of_basins(case, identifications, measurements)
     return draw_fit(fits, case.title, case.published.axis_rad)
 
 
-def draw_judged_fit(
-    case: Case, verdicts: Path, measurements: list[Path], calibrated: list[Path]
-) -> Figure:
+def draw_judged_fit(case: Case, verdicts: Path, measurements: list[Path]) -> Figure:
     """Draw the judged trace of a case and its best fit."""
-    fit = judged_fit(case, read_verdicts(verdicts), measurements[0], calibrated)
+    fit = judged_fit(case, read_verdicts(verdicts), measurements[0])
     trace = "recorded trace" if case.recorded else f"seed {JUDGED_SEED}"
     return draw_fit({f"best fit ({trace})": fit}, case.title, case.published.axis_rad)
 
@@ -97,12 +109,10 @@ def draw_profiles(case: Case, verdicts: Path, expected: list[Path]) -> Figure:
     return draw_profiles_of(read_verdicts(verdicts), others, case.title, case.parameters)
 
 
-def judged_fit(
-    case: Case, verdicts: Mapping[str, Any], measurements: Path, calibrated: list[Path]
-) -> FittedTrace:
+def judged_fit(case: Case, verdicts: Mapping[str, Any], measurements: Path) -> FittedTrace:
     """Return the judged trace of a case and its best fit."""
     values = {item["quantity"]: item["value"] for item in verdicts["quantities"]}
-    return _fit_of_seed(case, JUDGED_SEED, values, measurements, calibrated)
+    return _fit_of_seed(case, JUDGED_SEED, values, measurements)
 
 
 def draw_force(case: Case, target: Path) -> Figure:

@@ -11,26 +11,15 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+import biogrip_study.records.identifications as records
 from biogrip.arrays import Array
 from biogrip.digits import with_unit
 from biogrip.figures import style
 from biogrip.judging.quantities import parameters_and_sum, quantity_value
 from biogrip.judging.verdicts import DETERMINED
 from biogrip_study.config.study import Case
-from biogrip_study.figures.case_fit import SHOWN_SEEDS, first_of_basins, seeds_in_words
+from biogrip_study.figures.case_fit import SHOWN_SEEDS, draw_runs, first_of_basins, seeds_in_words
 from biogrip_study.methods.registry import METHODS
-from biogrip_study.records.identifications import (
-    ENCODABLE,
-    chi_square_increase,
-    near_noise,
-    near_noise_words,
-    reached_encodable,
-    read_histories,
-    read_identifications,
-    read_verdicts,
-    share_in_words,
-    values_by_quantity,
-)
 from biogrip_study.tables.study import bounds_at_truth
 
 # Of increases of chi-squared, smaller ones being drawn there.
@@ -46,49 +35,60 @@ def _runs(
     Histories are those of the seeds drawn individually and of these first ones.
     """
     method = case.study.shown_method.name
-    identified = read_identifications(identifications, case, method)
+    identified = records.read_identifications(identifications, case, method)
     looks = {
         int(run["seed"]): {"color": color, "linewidth": 1.5, "zorder": 3, "label": words}
         for (words, run), color in zip(
             first_of_basins(identified, case).items(), style.RUNS, strict=False
         )
     }
-    histories = read_histories(history, method, values)
+    histories = records.read_histories(history, method, values)
     drawn = histories["seed"].isin({*range(SHOWN_SEEDS), *looks})
     return identified, histories[drawn], looks
 
 
+def _draw_seeds(
+    axes: Axes,
+    histories: pd.DataFrame,
+    column: str,
+    seeds: int,
+    looks: Mapping[int, dict[str, Any]],
+) -> None:
+    """Draw a column over generations, a line a seed."""
+    if seeds > 1:
+        axes.plot([], [], color=style.ALL_SEEDS, label=seeds_in_words(seeds))
+    for seed, rows in histories.groupby("seed"):
+        axes.step(rows["generation"], rows[column], where="post", **looks.get(seed, _SEED))
+    axes.set_xlim(0, histories["generation"].max())
+
+
 def draw_convergence(case: Case, identifications: Path, history: Path) -> Figure:
     """Draw each seed's excess of the misfit over its noise, highlighting a run of each basin."""
-    method, tolerance = case.study.shown_method, case.study.near_noise_tolerance
+    method = case.study.shown_method
     identified, histories, looks = _runs(case, identifications, history, ["best_misfit"])
     noise = identified.set_index("seed")["noise_rms"]
     noisy = bool((noise > 0).all())
     unit = noise if noisy else noise.where(noise < 0, identified["misfit"].min())
     drawn = style.figure(style.COLUMN_IN, 2.9)
     axes = drawn.subplots()
-    if len(identified) > 1:
-        axes.plot([], [], color=style.ALL_SEEDS, label=seeds_in_words(len(identified)))
-    for seed, rows in histories.groupby("seed"):
-        excess = 100 * (rows["best_misfit"] / unit[seed] - 1)
-        axes.plot(rows["generation"], excess, **looks.get(seed, _SEED))
+    excess = 100 * (histories["best_misfit"] / histories["seed"].map(unit) - 1)
+    _draw_seeds(axes, histories.assign(excess=excess), "excess", len(identified), looks)
     reference = "noise" if noisy else "the lowest"
     line: dict[str, Any] = {"color": style.TARGET, "linewidth": 0.8}
     axes.axhline(0, linestyle="--", label=reference, **line)
-    last = int(histories["generation"].max())
     start = case.block.method("genetic").mutation_start
-    if method.name == "genetic" and start <= last:
+    if method.name == "genetic" and start <= histories["generation"].max():
         axes.axvline(start, linestyle=":", label="mutation starts", **line)
     title = case.title
     if noisy:
-        words = near_noise_words(tolerance)
-        axes.axhline(100 * tolerance, linestyle="-.", label=words, **line)
-        reached = near_noise(identified, tolerance).sum()
+        words = records.near_noise_words(case.study)
+        axes.axhline(100 * case.study.near_noise_tolerance, linestyle="-.", label=words, **line)
+        reached = records.near_noise(identified, case.study).sum()
         title += f": {reached} of {len(identified)} {words}"
     axes.set_yscale("symlog", linthresh=1, linscale=0.5)
     axes.yaxis.set_major_formatter("{x:g}")
-    axes.set(xlim=(0, last), xlabel=method.step, title=title)
-    axes.set(ylim=(-0.8, None), ylabel=f"best misfit above {reference} (%)")
+    axes.set(xlabel=method.step, title=title, ylim=(-0.8, None))
+    axes.set_ylabel(f"best misfit above {reference} (%)")
     drawn.legend(loc="outside lower center", ncols=2)
     return drawn
 
@@ -104,11 +104,7 @@ def draw_evolution(case: Case, identifications: Path, history: Path) -> Figure:
     for axes in grid[len(parameters) :]:
         axes.set_axis_off()
     for axes, parameter in zip(grid, parameters, strict=False):
-        if len(identified) > 1:
-            axes.plot([], [], color=style.ALL_SEEDS, label=seeds_in_words(len(identified)))
-        for seed, rows in histories.groupby("seed"):
-            look = looks.get(seed, _SEED)
-            axes.step(rows["generation"], rows[parameter.column], where="post", **look)
+        _draw_seeds(axes, histories, parameter.column, len(identified), looks)
         if (target := case.parameters.get(parameter.name, 0)) > 0:
             axes.axhline(target, color=style.TARGET, linestyle="--", label="target")
         if parameter.name in printed:
@@ -116,10 +112,7 @@ def draw_evolution(case: Case, identifications: Path, history: Path) -> Figure:
             axes.axhline(printed[parameter.name], color=style.PAPER, linestyle=":", label=label)
         if np.any(histories[parameter.column] > 0):
             axes.set_yscale("log")
-        axes.set(
-            ylabel=with_unit(parameter.symbol, parameter.unit),
-            xlim=(0, histories["generation"].max()),
-        )
+        axes.set_ylabel(with_unit(parameter.symbol, parameter.unit))
     for axes in grid[len(parameters) - 2 : len(parameters)]:
         axes.set_xlabel(case.study.shown_method.step)
     drawn.legend(*grid[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
@@ -129,9 +122,9 @@ def draw_evolution(case: Case, identifications: Path, history: Path) -> Figure:
 
 def draw_waterfall(case: Case, identifications: Path) -> Figure:
     """Draw sorted increases of chi-squared, of every method's runs and of best encodable points."""
-    identified = read_identifications(identifications, case)
-    increase = np.maximum(chi_square_increase(identified, case), _LOWEST)
-    reached = reached_encodable(identified, case)
+    identified = records.read_identifications(identifications, case)
+    increase = np.maximum(records.chi_square_increase(identified, case), _LOWEST)
+    reached = records.reached_encodable(identified, case)
     drawn = style.figure(style.COLUMN_IN, 3.5)
     axes = drawn.subplots()
     methods = identified["method"].unique()
@@ -139,10 +132,12 @@ def draw_waterfall(case: Case, identifications: Path) -> Figure:
     for name, width in zip(methods, np.linspace(3.2, 1.0, len(methods)), strict=True):
         method, runs = METHODS[name], identified["method"] == name
         place = 100 * (np.arange(runs.sum()) + 0.5) / runs.sum()
-        label = f"{method.title}: {share_in_words(int(reached[runs].sum()), len(place))}"
+        label = f"{method.title}: {records.share_in_words(int(reached[runs].sum()), len(place))}"
         look = {"color": style.COLORS[method.color], "linewidth": width}
         axes.plot(place, np.sort(increase[runs]), label=label, linestyle=method.dashes, **look)
-    least = np.sort(chi_square_increase(identified, case, ENCODABLE)[runs]).clip(_LOWEST)
+    least = np.sort(records.chi_square_increase(identified, case, records.ENCODABLE)[runs]).clip(
+        _LOWEST
+    )
     axes.plot(place, least, "--", color=style.TARGET, linewidth=0.8, label="best encodable point")
     axes.set(yscale="log", ylim=(_LOWEST / 2, None), xlim=(0, 100), xlabel="seeds, sorted (%)")
     axes.set_ylabel(f"Δχ² over the lowest known, {_LOWEST:g} or more")
@@ -154,23 +149,18 @@ def draw_waterfall(case: Case, identifications: Path) -> Figure:
 # Bounds on both sides of 1 that an axis shows, more where quartiles are further off; where that
 # leaves no room above zero, it shows decades.
 _WIDTHS, _LOOSE, _MOST_DECADES = 8.0, 0.95, 4
-# Points at the edge would make the layout leave them room.
-_DOTS: dict[str, Any] = {
-    "linestyle": "", "marker": "o", "markersize": 2, "markeredgewidth": 0, "alpha": 0.55,
-    "clip_on": False, "in_layout": False,
-}  # fmt: skip
 _PAPER: dict[str, Any] = {"color": style.PAPER, "linestyle": (0, (4, 2))}
 
 
-def draw_scatter(
-    case: Case, identifications: Path, target: Path, expected: Path, calibrated: list[Path]
-) -> Figure:
+def draw_scatter(case: Case, identifications: Path, target: Path, expected: Path) -> Figure:
     """Draw identified over target for every quantity and method."""
-    verdicts = {item["quantity"]: item["verdict"] for item in read_verdicts(expected)["quantities"]}
-    identified = read_identifications(identifications, case)
-    values = values_by_quantity(identified, case.experiment.searched)
+    verdicts = {
+        item["quantity"]: item["verdict"] for item in records.read_verdicts(expected)["quantities"]
+    }
+    identified = records.read_identifications(identifications, case)
+    values = records.values_by_quantity(identified, case.experiment.searched)
     printed = case.published.identified
-    bounds = bounds_at_truth(case, target, calibrated)
+    bounds = bounds_at_truth(case, target)
     drawn, grid = style.row_of_panels(len(bounds), 3.1)
     quantities = parameters_and_sum(case.experiment.searched)
     for index, (axes, quantity) in enumerate(zip(grid, quantities, strict=True)):
@@ -203,12 +193,8 @@ def _draw_ratios(axes: Axes, case: Case, of_methods: Mapping[str, Array], limit:
     decades = float(np.clip(np.ceil(np.max(np.abs(ends))), 1, _MOST_DECADES))
     bottom, top = (10**-decades, 10**decades) if loose else (1 - reach, 1 + reach)
     for place, (name, ratios) in enumerate(of_methods.items()):
-        shown = ratios[:SHOWN_SEEDS]
-        # A fixed sideways scatter keeps points apart.
-        x = place + 0.6 * ((np.arange(len(shown)) * 0.618034) % 1 - 0.5)
-        look = _DOTS | {"color": style.COLORS[METHODS[name].color]}
-        limits = (-np.inf, bottom), (np.inf, top)
-        style.points_within(axes, np.column_stack([x, shown]), *limits, look, edge_size=3)
+        color = style.COLORS[METHODS[name].color]
+        draw_runs(axes, place, ratios[:SHOWN_SEEDS], (bottom, top), color)
         low, middle, high = np.clip(quartiles[place], bottom, top)
         axes.plot([place, place], [low, high], color=style.TARGET, linewidth=1.0)
         axes.plot([place - 0.3, place + 0.3], [middle, middle], color=style.TARGET, linewidth=1.4)

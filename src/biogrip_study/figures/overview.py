@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
+import biogrip_study.records.identifications as records
 from biogrip.arrays import Array
 from biogrip.digits import with_unit
 from biogrip.figures import style
@@ -19,42 +20,23 @@ from biogrip.judging.verdicts import BOUNDED_ABOVE
 from biogrip.physics.noise import standard_deviation
 from biogrip.physics.sample_model import Network, complex_modulus
 from biogrip_study.config.study import Case, Study
-from biogrip_study.figures.case_fit import (
-    SHOWN_SEEDS,
-    first_seeds,
-    fits_of_basins,
-    judged_fit,
-    seeds_in_words,
-)
-from biogrip_study.records.identifications import (
-    near_noise,
-    near_noise_words,
-    read_identifications,
-    read_verdicts,
-    values_by_quantity,
-)
+from biogrip_study.figures import case_fit
+from biogrip_study.methods.registry import METHODS
 from biogrip_study.records.traces import read_target
 
 # End of the axis of identified over target values.
 _WORST = 1e3
 _TITLE_LETTERS = 19
-_DOTS: dict[str, Any] = {
-    "linestyle": "", "marker": "o", "markersize": 2.2, "markeredgewidth": 0, "alpha": 0.55
-}  # fmt: skip
 
 
 def draw_overview(
-    study: Study,
-    identifications: list[Path],
-    expected: list[Path],
-    measurements: list[Path],
-    calibrated: list[Path],
+    study: Study, identifications: list[Path], expected: list[Path], measurements: list[Path]
 ) -> Figure:
     """Draw a fit of each basin of the first case, and identified over target values of some."""
     cases = list(study.cases.values())
     drawn = style.figure(style.PAGE_IN, 3.0)
     axes = drawn.subplots(1, 1 + len(cases), width_ratios=[2] + [1.05] * len(cases))
-    fits = fits_of_basins(cases[0], identifications[0], measurements, calibrated)
+    fits = case_fit.fits_of_basins(cases[0], identifications[0], measurements)
     factor, _ = draw_traces(axes[0], fits)
     fit = next(iter(fits.values()))
     axes[0].set_ylim(top=1.65 * factor * fit.measured.max())
@@ -63,10 +45,10 @@ def draw_overview(
     style.panel(axes[0], "a", cases[0].title)
     files = zip(axes[1:], cases, identifications, expected, strict=True)
     for index, (scatter, case, path, judged) in enumerate(files):
-        identified = read_identifications(path, case, study.shown_method.name)
-        quantities = read_verdicts(judged)["quantities"]
+        identified = records.read_identifications(path, case, study.shown_method.name)
+        quantities = records.read_verdicts(judged)["quantities"]
         bounded = {item["quantity"] for item in quantities if item["verdict"] != BOUNDED_ABOVE}
-        _draw_ratios(scatter, case, first_seeds(identified), bounded)
+        _draw_ratios(scatter, case, case_fit.first_seeds(identified), bounded)
         scatter.tick_params(labelleft=index == 0)
         style.panel(scatter, "bcd"[index], case.title, most_letters=_TITLE_LETTERS)
     axes[1].set_ylabel("identified / target")
@@ -75,26 +57,28 @@ def draw_overview(
         loc="outside lower right",
         ncols=5,
         markerscale=2.5,
-        title=seeds_in_words(len(identified)) if len(identified) > SHOWN_SEEDS else None,
+        title=case_fit.seeds_in_words(len(identified))
+        if len(identified) > case_fit.SHOWN_SEEDS
+        else None,
     )
     return drawn
 
 
 def _draw_ratios(axes: Axes, case: Case, fits: pd.DataFrame, bounded: set[str]) -> None:
     """Draw identified over target values of what is determined or bounded below."""
-    reached = near_noise(fits, tolerance := case.study.near_noise_tolerance)
+    reached = records.near_noise(fits, case.study)
     looks = {
-        f"fit {near_noise_words(tolerance)}": (reached, style.FITTED),
+        f"fit {records.near_noise_words(case.study)}": (reached, style.FITTED),
         "other fits": (~reached, style.ALL_SEEDS),
     }
     for label, (_, color) in looks.items():
-        axes.plot([], [], **_DOTS | {"color": color}, label=label)
+        axes.plot([], [], **case_fit.DOTS | {"color": color}, label=label)
     axes.plot([], [], "^", color=style.TARGET, markersize=1.6, label="beyond the axis")
     axes.axhline(1, color=style.TARGET, linewidth=0.8, label="truth")
     if case.published.identified:
         axes.plot([], [], color=style.PAPER, label="paper")
     ticks: list[str] = []
-    found = values_by_quantity(fits, case.sample.model)
+    found = records.values_by_quantity(fits, case.sample.model)
     for quantity in parameters_and_sum(case.sample.model):
         label, values = quantity.label, found[quantity.label]
         target = quantity_value(label, case.parameters)
@@ -102,12 +86,9 @@ def _draw_ratios(axes: Axes, case: Case, fits: pd.DataFrame, bounded: set[str]) 
             continue
         x = len(ticks)
         ticks.append(quantity.symbol.replace(" ", ""))
-        place = x + 0.5 * ((np.arange(len(values)) * 0.618034) % 1 - 0.5)
-        points = np.column_stack([place, values / target])
+        ratios = values.to_numpy(float) / target
         for which, color in reversed(looks.values()):
-            limits = (-np.inf, 1 / _WORST), (np.inf, _WORST)
-            look = _DOTS | {"color": color}
-            style.points_within(axes, points[which], *limits, look, edge_size=3.5)
+            case_fit.draw_runs(axes, x, ratios[which], (1 / _WORST, _WORST), color)
         if (paper := quantity_value(label, case.published.identified)) is not None:
             shown = np.clip(paper / target, 1 / _WORST, _WORST)
             axes.plot([x - 0.4, x + 0.4], [shown, shown], color=style.PAPER)
@@ -115,16 +96,16 @@ def _draw_ratios(axes: Axes, case: Case, fits: pd.DataFrame, bounded: set[str]) 
     axes.set_xticks(range(len(ticks)), ticks)
 
 
-def draw_answer(study: Study, verdicts: Path, measurements: Path, calibrated: list[Path]) -> Figure:
+def draw_answer(study: Study, verdicts: Path, measurements: Path) -> Figure:
     """Draw a gripper, the judged trace of the only case, and what it tells of two dampers."""
     (case,) = study.cases.values()
-    judged = read_verdicts(verdicts)
+    judged = records.read_verdicts(verdicts)
     items = {item["quantity"]: item for item in judged["quantities"]}
     drawn = style.figure(style.COLUMN_IN, 3.4)
     (device, trace), profiles = drawn.subplots(2, 2)
     _device(device)
     style.panel(device, "1", "two arms squeeze")
-    fit = judged_fit(case, judged, measurements, calibrated)
+    fit = case_fit.judged_fit(case, judged, measurements)
     factor, unit = draw_traces(trace, {"fit": fit})
     trace.set_ylim(top=1.45 * factor * fit.measured.max())
     trace.set(xlabel="time (s)", ylabel=with_unit("rotation", unit))
@@ -187,11 +168,13 @@ def _draw_moduli_of_case(
     omega = np.geomspace(slowest / 30, 30 * fastest, _MODULI_DRAWN)
     model = case.experiment.model
     near = []
-    for method in {m.name: m for m in (study.shown_method, study.fitting_method)}.values():
-        runs = first_seeds(read_identifications(identified, case, method.name))
+    # The first method, and least squares if the study has it.
+    names = dict.fromkeys([*study.config.methods[:1], "least_squares"])
+    for method in [METHODS[name] for name in names if name in study.config.methods]:
+        runs = case_fit.first_seeds(records.read_identifications(identified, case, method.name))
         fits = runs[[p.column for p in model.parameters]].to_numpy(float)
         moduli = _modulus(model.network(fits), omega)
-        near.append(moduli[near_noise(runs, study.near_noise_tolerance)])
+        near.append(moduli[records.near_noise(runs, study)])
         look: dict[str, Any] = {"color": style.COLORS[method.color], "alpha": 0.45}
         axes.plot(omega, moduli.real.T, linewidth=0.4, **look)
         axes.plot(omega, moduli.imag.T, "--", linewidth=0.4, **look)

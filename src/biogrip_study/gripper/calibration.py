@@ -3,7 +3,7 @@
 A calibrated gripper is written as a config block that can be laid over a study.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
@@ -38,22 +38,20 @@ def _rounded_arm(arm: Arm, digits: int) -> dict[str, float]:
     return {key: float(f"{getattr(arm, key):.{digits}g}") for key in ARM_KEYS}
 
 
-def with_calibration(experiment: Experiment, files: Sequence[Path]) -> Experiment:
-    """Take the arms and their standard uncertainties from the first calibration file, if any.
+def with_calibration(experiment: Experiment, file: Path) -> Experiment:
+    """Take the arms and their standard uncertainties from a calibration file.
 
     A file that is missing or is no calibration is a `BiogripError`.
     """
-    if not files:
-        return experiment
     try:
-        text = files[0].read_text(encoding="utf-8")
+        text = file.read_text(encoding="utf-8")
         if not text.endswith("\n"):
             raise ValueError("its end is missing")
         block = yaml.safe_load(text)["gripper"]
         left, right = (Arm(**_numbers_in(block[name])) for name in ("left", "right"))
         uncertainty = {name: _numbers_in(block["uncertainty"][name]) for name in ("left", "right")}
     except (OSError, yaml.YAMLError, KeyError, TypeError, ValueError) as error:
-        raise BiogripError(f"{files[0]}: cannot be read as a calibration: {error}.") from error
+        raise BiogripError(f"{file}: cannot be read as a calibration: {error}.") from error
     calibrated = replace(experiment.gripper, left=left, right=right)
     return replace(
         experiment, gripper=calibrated, uncertainty={**experiment.uncertainty, **uncertainty}

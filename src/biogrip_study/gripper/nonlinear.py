@@ -182,13 +182,9 @@ class _MeshModes:
     def __init__(self, rates: Array, weights: Array, lengths_s: Array) -> None:
         a, ones = _radau()[1], np.ones(_STAGES)
         z = rates[:, :, None] * lengths_s
-        # (1 - z A)^-1 through the eigenvectors of A: one scalar inverse each.
-        eigenvalues, vectors = np.linalg.eig(a)
-        products = np.einsum("ik,kj->kij", vectors, np.linalg.inv(vectors)).reshape(_STAGES, -1)
-        inverse = (1 / (1 - z[..., None] * eigenvalues)) @ products
-        self._inverse = inverse.real.reshape(*z.shape, _STAGES, _STAGES)
-        self._carry = self._inverse @ ones
-        self._gain = lengths_s[:, None, None] * (self._inverse @ a)
+        inverse = np.linalg.inv(np.eye(_STAGES) - z[..., None, None] * a)
+        self._carry = inverse @ ones
+        self._gain = lengths_s[:, None, None] * (inverse @ a)
         self._rates = rates[:, None, :, None, None]
         self._residues = weights * rates[:, None, None, :]
 

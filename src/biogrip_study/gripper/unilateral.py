@@ -18,13 +18,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from biogrip.arrays import Array, BoolArray
-from biogrip.errors import BiogripError
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.protocol import Course
 from biogrip.physics.response import phi_functions
 from biogrip.physics.sample_model import Network
 
-_MOST_EVENTS = 100_000
 # Share of the largest force and closing below which a change of contact is rounding.
 _LEAST_CHANGE = 1e-11
 # Time within which a sample without a parallel damper yields, for what is seen at once.
@@ -67,11 +65,6 @@ def unilateral_response(
     -------
     UnilateralResponse
         What is seen at these times.
-
-    Raises
-    ------
-    BiogripError
-        If contact is lost too often.
     """
     state = np.zeros((3 + network.k.shape[1], len(time_s)))
     force_N, touching = np.zeros(len(time_s)), np.zeros(len(time_s), dtype=bool)
@@ -79,11 +72,6 @@ def unilateral_response(
     for stretch in _stretches(gripper, network, torque):
         if stretch.touching != (len(changes_s) % 2 == 0):
             changes_s.append(stretch.begin_s)
-        if len(changes_s) > 2 * _MOST_EVENTS:
-            raise BiogripError(
-                f"the jaws leave the sample more than {_MOST_EVENTS} times; allowed are protocols "
-                "with fewer phases."
-            )
         # A reading at its end is also the first of the next, which replaces it.
         here = (time_s >= stretch.begin_s) & (time_s <= stretch.end_s)
         elapsed_s = time_s[here] - stretch.begin_s

@@ -97,14 +97,13 @@ def identify_many(
     # In single bytes, which sorting and crossover copy in half of the time.
     everyone: Chromosomes = np.stack(drawn).astype(np.int8)
     survivors, ranking = select(everyone, ranked(everyone, running), settings.survivors)
-    improved, stalled = np.zeros_like(running), np.zeros(len(rngs), dtype=bool)
+    improved = np.zeros_like(running)
     courses: list[list[HistoryRow]] = [[] for _ in rngs]
     evaluations = settings.population
     record()
     for generation in range(1, settings.max_generations + 1):
         waited = generation - 1 - improved[running] >= settings.patience
         if generation > settings.min_generations and waited.any():
-            stalled[running[waited]] = True
             running, survivors, ranking = running[~waited], survivors[~waited], ranking[~waited]
             if not len(running):
                 break
@@ -126,11 +125,11 @@ def identify_many(
         to_come = len(running) * (1 - generation / settings.max_generations)
         progress(1 - to_come / len(rngs))
     fits = []
-    for course, has_stalled in zip(courses, stalled.tolist(), strict=True):
-        parameters, misfit, _, evaluations = course[-1]
-        why = "stalled" if has_stalled else "generation limit"
-        steps, history = len(course) - 1, History.of(course)
-        fits.append(Fit(parameters, misfit, steps, evaluations, why, history))
+    for course in courses:
+        (parameters, misfit, _, evaluations), generations = course[-1], len(course) - 1
+        why = "stalled" if generations < settings.max_generations else "generation limit"
+        given = parameters, misfit, generations, evaluations, why
+        fits.append(Fit(*given, History.of(course)))
     return fits
 
 

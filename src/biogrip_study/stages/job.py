@@ -78,21 +78,25 @@ def keys_of_cases(study: Study, *keys: str) -> list[str]:
     return [f"cases.{name}.{key}" for name in study.cases for key in keys]
 
 
-def case_with_keys(name: str, given: Mapping[str, Any]) -> Case:
-    """Return a case of which some keys are given, by `settings`."""
-    study = Study(_named(StudyConfig, given))
+def case_with_keys(name: str, given: Mapping[str, Any], calibrated: Iterable[Path] = ()) -> Case:
+    """Return a case of which some keys are given, by `settings`, and the file of its gripper."""
+    study = Study(_named(StudyConfig, given), calibrations={file.stem: file for file in calibrated})
     return Case(name, _named(CaseBlock, given), study.config, study=study)
 
 
-def study_of(given: Mapping[str, Any]) -> Study:
-    """Return a study of which, and of whose cases, some keys are given, by `settings`."""
+def study_of(given: Mapping[str, Any], calibrated: Iterable[Path] = ()) -> Study:
+    """Return a study of which, and of whose cases, some keys are given, by `settings`.
+
+    Calibrated grippers are named like their cases.
+    """
     cases: dict[str, dict[str, Any]] = {}
     for key, value in given.items():
         if key.startswith("cases."):
             _, name, inner = key.split(".", 2)
             cases.setdefault(name, {})[inner] = value
     blocks = {name: _named(CaseBlock, keys) for name, keys in cases.items()}
-    return Study(_named(StudyConfig, given, cases=blocks))
+    named = _named(StudyConfig, given, cases=blocks)
+    return Study(named, calibrations={file.stem: file for file in calibrated})
 
 
 def _named(kind: Any, given: Mapping[str, Any], **keys: Any) -> Any:
@@ -133,8 +137,8 @@ def logged(job: Any) -> Iterator[None]:
 
 
 def job_study(job: Any) -> Study:
-    """Return the study of a job, with the keys of the config that its rule names."""
-    return study_of(job_settings(job))
+    """Return the study of a job, with the keys and the calibrated grippers that its rule names."""
+    return study_of(job_settings(job), paths(job.input.get("calibrated", [])))
 
 
 def job_settings(job: Any) -> dict[str, Any]:
@@ -162,7 +166,8 @@ def arguments(job: Any, function: Callable[..., object]) -> dict[str, Any]:
     given["seeds"] = [*seeds_of(given.get("batch", "seeds_0-0"))]
     for name, kind in get_type_hints(function).items():
         if kind is Case:
-            given[name] = case_with_keys(job.wildcards.case, job_settings(job))
+            calibrated = paths(job.input.get("calibrated", []))
+            given[name] = case_with_keys(job.wildcards.case, job_settings(job), calibrated)
         elif kind is Study:
             given[name] = job_study(job)
         elif kind is Path:

@@ -16,11 +16,13 @@ from biogrip.errors import BiogripError
 from biogrip.files import write_text
 from biogrip.physics.noise import Noise, add_noise, stream
 from biogrip.physics.protocol import evaluate, sample_times
+from biogrip.physics.simulation import simulated_response
 from biogrip.terminal import warn
 from biogrip.traces.columns import place
 from biogrip_study.config.study import Case
 from biogrip_study.gripper.calibration import calibrate, calibration_yaml, free_motion
-from biogrip_study.gripper.simulation import jaw_force, target_grip, target_rotation
+from biogrip_study.gripper.nonlinear import nonlinear_rotation
+from biogrip_study.gripper.simulation import jaw_force, target_grip
 from biogrip_study.gripper.unilateral import unilateral_response
 from biogrip_study.records.rows import write_arrays
 from biogrip_study.records.traces import (
@@ -59,7 +61,8 @@ def response(case: Case, time_s: Array) -> tuple[Array, Array | None]:
     if case.block.contact == "unilateral":
         apart = unilateral_response(*device, time_s)
         return apart.rotation[0], apart.jaw_force_N
-    read = target_rotation(*device, time_s, nonlinear=nonlinear)[0]
+    simulate = nonlinear_rotation if nonlinear else simulated_response
+    read = simulate(*device, time_s)[0]
     if not case.instrument.has_jaws:
         return read, None
     return read, jaw_force(*device, time_s, nonlinear=nonlinear)[0]

@@ -12,20 +12,11 @@ from typing import Any
 
 import numpy as np
 
+import biogrip_study.records.identifications as records
 from biogrip.digits import counted
 from biogrip.judging.quantities import parameters_and_sum, quantity_value
 from biogrip.judging.verdicts import DETERMINED
 from biogrip_study.config.study import Case, Study
-from biogrip_study.records.identifications import (
-    ALL,
-    basins,
-    near_noise,
-    near_noise_words,
-    read_identifications,
-    read_verdicts,
-    share_with_limits,
-    values_by_quantity,
-)
 from biogrip_study.tables.layout import Column, Row, ShownTable, titled
 
 _QUANTILES = {"p05": 0.05, "p25": 0.25, "median": 0.5, "p75": 0.75, "p95": 0.95}
@@ -49,23 +40,24 @@ _BASINS = (
 )
 
 
-def _error_columns(near_noise_tolerance: float) -> tuple[Column, ...]:
-    share = f"Share {near_noise_words(near_noise_tolerance)}"
+def _error_columns(study: Study) -> tuple[Column, ...]:
+    share = f"Share {records.near_noise_words(study)}"
     ends = (Column(f"near_noise_{end}", f"95 % {end}", 2) for end in ("from", "to"))
     return (*_ERROR_COLUMNS, Column("near_noise_share", share, 2), *ends)
 
 
 def errors_of_case(case: Case, identifications: Path) -> ShownTable:
     """Compare target and identified values of one case, given its identifications, CSV."""
-    tolerance = case.study.near_noise_tolerance
-    identified = read_identifications(identifications, case, case.study.shown_method.name)
+    identified = records.read_identifications(identifications, case, case.study.shown_method.name)
     of_case: Row = {"case": case.name}
     if identified["noise_rms"].notna().all():
-        near = share_with_limits(int(near_noise(identified, tolerance).sum()), len(identified))
+        near = records.share_with_limits(
+            int(records.near_noise(identified, case.study).sum()), len(identified)
+        )
         of_case |= zip((f"near_noise_{end}" for end in ("share", "from", "to")), near, strict=True)
     rows = []
-    for basin, runs in ({ALL: identified} | basins(identified, tolerance)).items():
-        found = values_by_quantity(runs, case.sample.model)
+    for basin, runs in ({records.ALL: identified} | records.basins(identified, case.study)).items():
+        found = records.values_by_quantity(runs, case.sample.model)
         for quantity in parameters_and_sum(case.sample.model):
             values, target = found[quantity.label], quantity_value(quantity.label, case.parameters)
             of_quantity = {
@@ -87,7 +79,7 @@ def errors_of_case(case: Case, identifications: Path) -> ShownTable:
         if case.parameters
         else f"{case.title}: parameters identified in the recorded trace."
     )
-    return ShownTable(caption, _error_columns(tolerance), rows)
+    return ShownTable(caption, _error_columns(case.study), rows)
 
 
 def error_percent(target: float | None, identified: Any) -> Any:
@@ -117,7 +109,7 @@ def errors(study: Study, identifications: list[Path]) -> ShownTable:
         # Text, as ">100", stays; not every case or parameter has one.
         with suppress(ValueError, TypeError, KeyError):
             row["paper_error_percent"] = float(row["paper_error_percent"])
-    columns = _error_columns(study.near_noise_tolerance)
+    columns = _error_columns(study)
     return ShownTable(f"Identification errors of all cases. {_BASINS}", columns, rows)
 
 
@@ -139,7 +131,10 @@ def _verdict_columns(confidence: float) -> tuple[Column, ...]:
 
 def verdicts_of_case(case: Case, verdicts: Path, expected: list[Path]) -> ShownTable:
     """List the verdicts on all quantities of a case, and those expected, where there are any."""
-    judged, others = read_verdicts(verdicts), [read_verdicts(path) for path in expected]
+    judged, others = (
+        records.read_verdicts(verdicts),
+        [records.read_verdicts(path) for path in expected],
+    )
     foreseen_of = {item["quantity"]: item for item in others[0]["quantities"]} if others else {}
     rows = []
     for item in judged["quantities"]:

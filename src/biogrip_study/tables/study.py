@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 from scipy.special import betaincinv
 
+import biogrip_study.records.identifications as records
 from biogrip.fit.nested_fits import aic_and_bic
 from biogrip.judging.likelihood import least_sd
 from biogrip.judging.quantities import parameters_and_sum, quantity_value
@@ -14,18 +15,7 @@ from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, N
 from biogrip.levels import WIDE
 from biogrip.physics.noise import standard_deviation
 from biogrip_study.config.study import Case, Study
-from biogrip_study.gripper.calibration import with_calibration
 from biogrip_study.methods.registry import METHODS
-from biogrip_study.records.identifications import (
-    ENCODABLE,
-    INTERVALS,
-    MODEL_FITS,
-    chi_square_increase,
-    reached_encodable,
-    read_identifications,
-    share_with_limits,
-    values_by_quantity,
-)
 from biogrip_study.records.rows import require_rows, seeds_of
 from biogrip_study.records.traces import read_target
 from biogrip_study.tables.cases import error_percent
@@ -47,10 +37,10 @@ def methods(study: Study, identifications: list[Path]) -> ShownTable:
     rows = []
     labels = {}
     for (name, case), path in zip(study.cases.items(), identifications, strict=True):
-        identified = read_identifications(path, case)
-        identified["increase"] = chi_square_increase(identified, case)
-        identified["least"] = chi_square_increase(identified, case, ENCODABLE)
-        identified["reached"] = reached_encodable(identified, case)
+        identified = records.read_identifications(path, case)
+        identified["increase"] = records.chi_square_increase(identified, case)
+        identified["least"] = records.chi_square_increase(identified, case, records.ENCODABLE)
+        identified["reached"] = records.reached_encodable(identified, case)
         for method, mine in identified.groupby("method", sort=False):
             row: Row = {
                 "case": name,
@@ -60,9 +50,9 @@ def methods(study: Study, identifications: list[Path]) -> ShownTable:
                 "encodable_rise": mine["least"].median(),
                 "median_evaluations": mine["evaluations"].median(),
             }
-            shares = share_with_limits(int(mine["reached"].sum()), len(mine))
+            shares = records.share_with_limits(int(mine["reached"].sum()), len(mine))
             row |= zip(("reached_share", "reached_low", "reached_high"), shares, strict=True)
-            for label, values in values_by_quantity(mine, case.sample.model).items():
+            for label, values in records.values_by_quantity(mine, case.sample.model).items():
                 error = error_percent(quantity_value(label, case.parameters), values)
                 row[f"error_percent {label}"] = abs(error).median()
                 labels[f"error_percent {label}"] = f"Error {label} %"
@@ -91,26 +81,24 @@ _MODEL_COLUMNS = (
 
 def models(study: Study, fits: list[Path]) -> ShownTable:
     """Count over seeds which model has the lowest AIC and BIC, see `aic_and_bic`."""
-    fitted = pd.concat([read_fits(study, path) for path in fits])
-    fitted["aic"], fitted["bic"] = aic_and_bic(
-        fitted["misfit"], fitted["samples"], fitted["parameters"]
-    )
-    rows = []
-    for case, made in study.cases.items():
-        maker = None if made.recorded else made.sample.candidate
-        of_case = fitted[fitted["case"] == case]
-        # In the configured order, since idxmin takes the first of equals.
-        tried = list(of_case["model"].unique())
-        values = {c: of_case.pivot(index="seed", columns="model", values=c) for c in ("aic", "bic")}
-        delta = {c: wide[tried].sub(wide.min(axis=1), axis=0) for c, wide in values.items()}
-        for name in tried:
-            model = made.models[name].model
-            row: Row = {"case": case, "model": model.title + " (made the traces)" * (name == maker)}
-            row |= {"parameters": len(model.names), "seeds": len(delta["aic"])}
-            for criterion, above_lowest in delta.items():
-                row[f"median_delta_{criterion}"] = above_lowest[name].median()
-                row[f"chosen_by_{criterion}"] = (above_lowest.idxmin(axis=1) == name).sum()
-            rows.append(row)
+    fitted = pd.concat([read_fits(study, path) for path in fits], ignore_index=True)
+    told = fitted["misfit"], fitted["samples"], fitted["parameters"]
+    fitted["aic"], fitted["bic"] = aic_and_bic(*told)
+    for name in ("aic", "bic"):
+        of_traces = fitted.groupby(["case", "seed"])[name]
+        fitted[f"delta_{name}"] = fitted[name] - of_traces.transform("min")
+        # Of equals the first, in the configured order.
+        fitted[f"by_{name}"] = fitted.index.isin(of_traces.idxmin())
+    rows: list[Row] = []
+    for (case, candidate), of_model in fitted.groupby(["case", "model"], sort=False):
+        made = study.cases[case]
+        maker, model = candidate == made.sample.candidate, made.models[candidate].model
+        row: Row = {"case": case, "parameters": len(model.names), "seeds": len(of_model)}
+        row["model"] = model.title + " (made the traces)" * (maker and not made.recorded)
+        for name in ("aic", "bic"):
+            row[f"median_delta_{name}"] = of_model[f"delta_{name}"].median()
+            row[f"chosen_by_{name}"] = of_model[f"by_{name}"].sum()
+        rows.append(row)
     caption = (
         "Simplest adequate model: by how much each model's AIC and BIC exceed the lowest, and in "
         "how many seeds it has the lowest."
@@ -121,7 +109,9 @@ def models(study: Study, fits: list[Path]) -> ShownTable:
 def read_fits(study: Study, path: Path) -> pd.DataFrame:
     """Read the fits of every model of a case, in the seeds of a batch."""
     case = study.cases[path.parent.name]
-    return MODEL_FITS.read(path, case=[case.name], model=case.models, seed=seeds_of(path.stem))
+    return records.MODEL_FITS.read(
+        path, case=[case.name], model=case.models, seed=seeds_of(path.stem)
+    )
 
 
 _COVERAGE_COLUMNS = (
@@ -145,18 +135,14 @@ _COVERAGE_COLUMNS = (
 _COUNTED = {"determined": (DETERMINED,), "one_sided": (BOUNDED_BELOW, BOUNDED_ABOVE)}
 
 
-def coverage(
-    study: Study, targets: list[Path], intervals: list[Path], calibrated: list[Path]
-) -> ShownTable:
+def coverage(study: Study, targets: list[Path], intervals: list[Path]) -> ShownTable:
     """Compare estimates and intervals of many seeds with the true values and the bound.
 
-    Targets are files of all cases, in their order; calibrated grippers are named like their case.
+    Targets are files of all cases, in their order.
     """
     rows: list[Row] = []
-    bounds = {
-        name: bounds_at_truth(case, target, [file for file in calibrated if file.stem == name])
-        for (name, case), target in zip(study.cases.items(), targets, strict=True)
-    }
+    files = zip(study.cases.items(), targets, strict=True)
+    bounds = {name: bounds_at_truth(case, target) for (name, case), target in files}
     for case, head, estimated in _by_quantity(study, intervals):
         fitted = estimated[estimated["estimate_rest_known"].notna()]
         shown = estimated[estimated["verdict"].notna()]
@@ -193,12 +179,12 @@ def _by_quantity(
             yield case, head | {"target": target}, of_case[of_case["quantity"] == quantity.label]
 
 
-def bounds_at_truth(case: Case, target: Path, calibrated: Sequence[Path]) -> dict[str, float]:
+def bounds_at_truth(case: Case, target: Path) -> dict[str, float]:
     """Return the Cramér-Rao bound of what is searched of a case, at the true parameters, by label.
 
     That is the standard deviation of the quantity's logarithm.
     """
-    experiment = with_calibration(case.experiment, calibrated)
+    experiment = case.experiment
     time_s, _, rotation = read_target(target, case.times_s)
     log_truth = experiment.logs(case.parameters)
     _, sensitivity = experiment.of(time_s, rotation).residuals(log_truth)
@@ -214,7 +200,7 @@ def read_intervals(study: Study, path: Path) -> pd.DataFrame:
 
     Seeds that are judged in full have all quantities.
     """
-    case, frame = study.cases[path.parent.name], INTERVALS.read(path)
+    case, frame = study.cases[path.parent.name], records.INTERVALS.read(path)
     every = [quantity.label for quantity in parameters_and_sum(case.experiment.searched)]
     estimated = frame.loc[frame["estimate_rest_known"].notna(), "quantity"].unique()
     often = case.block.identifiability.verdicts_every

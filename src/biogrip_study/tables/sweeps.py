@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+import biogrip_study.records.identifications as records
 from biogrip.arrays import BoolArray
 from biogrip.judging.likelihood import bounds_percent, headlines
 from biogrip.judging.quantities import Quantity, quantity_value
@@ -19,15 +20,8 @@ from biogrip.physics.noise import rms
 from biogrip.physics.simulation import simulated_response
 from biogrip_study.config.study import Case, Study
 from biogrip_study.config.study_blocks import AxisBlock
-from biogrip_study.gripper.calibration import with_calibration
 from biogrip_study.methods.genome import nearest_encodable
 from biogrip_study.methods.registry import METHODS
-from biogrip_study.records.identifications import (
-    near_noise,
-    near_noise_words,
-    read_batch,
-    values_by_quantity,
-)
 from biogrip_study.records.rows import RowFile
 from biogrip_study.tables.cases import error_percent
 from biogrip_study.tables.layout import Column, Row, ShownTable
@@ -46,29 +40,24 @@ POINTS = RowFile(
 _FACTOR, _BOUNDS_OF_BASIN = math.log(2), 4.0
 
 
-def judge_points(
-    study: Study, sweep: str, identifications: list[Path], calibrated: list[Path], points: Path
-) -> None:
+def judge_points(study: Study, sweep: str, identifications: list[Path], points: Path) -> None:
     """Compute errors and shares of successful seeds at every point of a sweep.
 
-    Batches of identifications are in folders named like point and method, calibrations are named
-    like their point.
+    Batches of identifications are in folders named like point and method.
     """
     block, rows = study.config.sweeps[sweep], list[tuple[str | int, ...]]()
     for name in block.cases:
         true, grid, bounds = study.cases[name].parameters, block.points(sweep, name), {}
         for point in grid:
             case = study.points[point.name]
-            of_point = [file for file in calibrated if file.stem == point.name]
-            experiment = with_calibration(case.experiment, of_point)
-            bounds[point.name] = bounds_percent(experiment, case.noise, true, case.times_s)
+            bounds[point.name] = bounds_percent(case.experiment, case.noise, true, case.times_s)
         heads = headlines(
             [(q.label, percent) for of_point in bounds.values() for q, percent in of_point]
         )
         for point, method in product(grid, study.config.methods):
             case = study.points[point.name]
             batches = [file for file in identifications if file.parts[-3:-1] == (case.name, method)]
-            runs = pd.concat([read_batch(file, case) for file in batches])
+            runs = pd.concat([records.read_batch(file, case) for file in batches])
             if case.noise.absent:
                 # Without noise, the misfit of the true values rounded to the genes' digits.
                 runs = runs.assign(noise_rms=_resolution(case, true))
@@ -86,12 +75,12 @@ def _judged(
     heads: list[str],
 ) -> Iterator[tuple[str | int, ...]]:
     """Yield quantity, number of runs, shares, median errors and bound in percent."""
-    found = values_by_quantity(runs, point.experiment.searched)
+    found = records.values_by_quantity(runs, point.experiment.searched)
     inside = np.ones(len(runs), dtype=bool)
     for quantity, percent in bounds:
         if (label := quantity.label) in heads:
             inside &= in_basin(found[label], quantity_value(label, true), percent / 100)
-    near = np.mean(near_noise(runs, point.study.near_noise_tolerance))
+    near = np.mean(records.near_noise(runs, point.study))
     shares = near, np.mean(inside) if heads else np.nan
     for quantity, percent in bounds:
         truth = quantity_value(quantity.label, true)
@@ -146,21 +135,19 @@ _CAPTION = (
 def robustness(study: Study, sweep: str, points: Path) -> ShownTable:
     """Return a row for each point of a sweep and the best and worst determined quantity."""
     block, frame = study.config.sweeps[sweep], POINTS.read(points)
-    frame["case"] = frame["point"].str.partition("--")[0]
     silent = frame["bound_percent"].isna()
     frame.loc[silent, _ERRORS] = frame.loc[silent, _ERRORS].clip(lower=_LEAST_PERCENT)
     rows: list[Row] = []
-    for case in block.cases:
-        of_case = frame[frame["case"] == case]
+    for case, of_case in frame.groupby(frame["point"].str.partition("--")[0], sort=False):
         first = of_case[of_case["method"] == study.shown_method.name]
         for quantity in headlines([*zip(first["quantity"], first["bound_percent"], strict=True)]):
             chosen = of_case[of_case["quantity"] == quantity]
             for _, at_point in chosen.groupby("point", sort=False):
-                row = at_point.iloc[0].to_dict()
+                row = {"case": case, **at_point.iloc[0]}
                 for method, values in at_point.set_index("method").iterrows():
                     row |= {f"{to}_{method}": values[of] for of, (to, _) in _BY_METHOD.items()}
                 rows.append(row)
-    words = near_noise_words(study.near_noise_tolerance)
+    words = records.near_noise_words(study)
     columns = (
         Column("case", "Case"),
         Column("row", _axis_heading(study, block.rows)),
