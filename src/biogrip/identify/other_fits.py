@@ -227,7 +227,7 @@ def _at_own_onset(
         return found
     other = replace(experiment, sample=CANDIDATES[name], fixed={})
     fits = OnsetFits(other, recording.time_s, recording.readings)
-    best = fits.near(fits.at(0.0, within_range(found.parameters, problem)), most_steps=1)
+    best = fits.near(fits.at(0.0, within_range(found.parameters, problem)))
     if best.misfit >= found.misfit:
         return found
     return replace(found, parameters=np.exp(best.log_parameters), misfit=best.misfit)

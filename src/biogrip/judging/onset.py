@@ -176,14 +176,14 @@ class OnsetFits:
         (found,) = identify_many([self.posed(guess_s)], _BUDGET, rngs, silent)
         return self.near(OnsetFit(guess_s, np.log(found.parameters), found.misfit))
 
-    def near(self, best: OnsetFit, most_steps: int = _MOST_STEPS) -> OnsetFit:
+    def near(self, best: OnsetFit) -> OnsetFit:
         """Fit the onset along near that of another fit, whose misfit is never exceeded.
 
         It goes on from interval to interval of `_smooth_intervals`, each from the best values of
         the one before, until no neighbour that was not tried has a lower misfit.
         """
         tried = list[tuple[float, float]]()
-        for _ in range(most_steps):
+        for _ in range(_MOST_STEPS):
             ends = [
                 (low_s, min(high_s, self._latest_s))
                 for low_s, high_s in self._smooth_intervals(best.onset_s)
@@ -509,7 +509,7 @@ def profile_over_onset(diagnosis: Diagnosis, time_s: Array) -> Diagnosis:
 def _at(best: Likelihood, change_s: float) -> Likelihood:
     """Return the likelihood of an onset that is later by some s, relative to that of the best."""
     problem = replace(best.problem, residuals=best.problem.residuals.later(change_s))
-    fit = fit_from([problem], best.best)
+    fit = fit_from([problem], best.best, roughly=True)
     misfit = float(fit.misfit[0])
     cost = best.increase(misfit)
     return replace(
