@@ -73,7 +73,7 @@ class Agreement:
         """Return 1 if the ratio of stiffness rises with what differs, -1 if it falls, else 0.
 
         From its least to its largest value, (n_traces,), the ratio differs, and no step between
-        goes the other way (`ONE_SAMPLE`).
+        goes the other way, or is one between equal values (`ONE_SAMPLE`).
         """
         order = np.argsort(what, kind="stable").tolist()
 
@@ -83,8 +83,12 @@ class Agreement:
             by = float(contrast @ self.log_ratios)
             return int(np.sign(by)) if abs(by) > least else 0
 
-        whole = step(order[0], order[-1]) if len({*what}) == len(what) else 0
-        return 0 if -whole in [step(*pair) for pair in pairwise(order)] else whole
+        whole = step(order[0], order[-1])
+        for one, other in pairwise(order):
+            by = step(one, other)
+            if by and (by != whole or what[one] == what[other]):
+                return 0
+        return whole
 
 
 def compare_traces(likelihood: Likelihood, singles: Sequence[Likelihood]) -> Agreement:
