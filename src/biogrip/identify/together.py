@@ -21,15 +21,7 @@ from biogrip.fit.problem import Fit, TraceProblem
 from biogrip.identify.data import judged_data, moduli_between
 from biogrip.judging.agreement import Agreement, compare_traces, shared_freedom
 from biogrip.judging.diagnosis import Diagnosis, lower_fit, profile_all, with_notes, with_times
-from biogrip.judging.doubts import (
-    DOUBT,
-    DOUBTFUL,
-    REJECTED,
-    REJECTION,
-    Note,
-    find_reasons,
-    order_notes,
-)
+from biogrip.judging.doubts import REJECTED, REJECTION, Note, find_reasons, order_notes
 from biogrip.judging.likelihood import Likelihood, find_thresholds
 from biogrip.judging.without_model import KINDS, WithoutModel, tell_without_model
 from biogrip.physics.protocol import largest_load
@@ -37,8 +29,6 @@ from biogrip.physics.protocol import largest_load
 # What a stiffness does, and what two explanations of that leave open.
 _WAYS = {1: "rises", -1: "falls"}
 _NOT_TOLD = ": repeat the first trace at the end to tell which"
-# What the status of a trace by itself is to the joint fit.
-_WEIGHTS = {DOUBTFUL: DOUBT, REJECTED: REJECTION}
 
 
 @dataclass(frozen=True, repr=False)
@@ -132,8 +122,9 @@ def identify_sample_of(names: Sequence[str], diagnoses: Sequence[Diagnosis]) -> 
     if not agreement.holds:
         notes.append(Note(REJECTION, _differences(names, diagnoses, agreement)))
     for name, one in zip(names, diagnoses, strict=True):
-        weight, why = _WEIGHTS.get(one.status), " ".join(find_reasons(order_notes(one.notes)))
-        notes += [Note(weight, f"{name}, by itself {one.status}: {why}")] if weight else []
+        if why := find_reasons(heaviest := order_notes(one.notes)):
+            text = f"{name}, by itself {one.status}: {' '.join(why)}"
+            notes.append(Note(heaviest[0].weight, text))
     judged = with_notes(replace(judged, converged=best_fit.converged), notes)
     of_joint = {**vars(with_times([judged])[0]), "experiment": first}
     return Together(**of_joint, names=tuple(names), traces=tuple(diagnoses), agreement=agreement)
