@@ -290,7 +290,9 @@ def test_a_doubted_trace_makes_its_sample_doubtful() -> None:
 def test_traces_of_several_units_are_refused() -> None:
     traces = creep(1)
     moved = {**traces[0], "reads": "displacement"}
-    with pytest.raises(BiogripError, match="trace 2: found another sample than of trace 1"):
+    with pytest.raises(
+        BiogripError, match="trace 2: found zener_kelvin in N/m, 95 % limits, allowed"
+    ):
         library.identify_together(
             [{**traces[0], "reads": "strain"}, moved], model="zener_kelvin", config=NONE
         )
