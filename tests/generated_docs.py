@@ -21,17 +21,21 @@ import pandas as pd
 import yaml
 from scipy.stats import chi2
 
+from biogrip.arrays import Array
 from biogrip.cli import main
 from biogrip.command.words import in_sentences
+from biogrip.design import NO_BOUND, relative_bounds
 from biogrip.digits import plain as in_digits
 from biogrip.digits import with_unit
 from biogrip.fit.least_squares import identify_many
 from biogrip.fit.problem import silent
 from biogrip.physics.drawing import sketched
 from biogrip.physics.models import ALIASES, MODELS
-from biogrip.physics.noise import add_noise, stream
+from biogrip.physics.modes import linear_responses
+from biogrip.physics.noise import add_noise, standard_deviation, stream
 from biogrip.physics.simulation import simulated_response
 from biogrip.records import read_table
+from biogrip_study.config.study import Case
 from biogrip_study.page import answers
 from biogrip_study.records.identifications import share_in_words
 from tests.helpers.default import STUDY, study_of
@@ -184,6 +188,30 @@ def protocols_compared() -> str:
         | {f"within 10 % of {row['seeds']}": _share(row, "enough")}
         for row in table.to_dict("records")
     )
+
+
+def protocols_together() -> str:
+    """What two protocols of one gripper tell of one drop together: information adds."""
+    repaired = study_of((ROOT / "config" / "repaired.yaml").read_text(encoding="utf-8"))
+
+    def told(case: Case) -> Array:
+        experiment = case.experiment
+        values = np.array([case.parameters[name] for name in experiment.searched.names])
+        given = experiment.gripper, experiment.searched, experiment.torque, case.times_s
+        read, *slopes = linear_responses(*given, values[None])[0]
+        return np.array(slopes) / standard_deviation(read, case.noise)
+
+    rows, chosen = [], {"the paper's": (0,), "the other": (1,), "both": (0, 1)}
+    chosen |= {"the paper's, twice": (0, 0), "both, the other ten times": (0, *(1,) * 10)}
+    for drop in ("liquid_drop_1", "liquid_drop_2"):
+        case = STUDY.cases[drop]
+        of = [told(case), told(repaired.cases[f"{drop}_alternated"])]
+        for protocols, which in chosen.items():
+            bounds = relative_bounds(np.hstack([of[index] for index in which]), 1.0)
+            named = zip(case.experiment.searched.names, bounds.tolist(), strict=True)
+            said = {name: f"{100 * it:.2g} %" if it < NO_BOUND else "none" for name, it in named}
+            rows.append({"sample": case.title, "protocols": protocols, **said})
+    return _table(rows)
 
 
 def _claims() -> list[dict[str, str]]:
@@ -430,6 +458,7 @@ PARTS: dict[str, dict[str, Callable[[], str]]] = {
         "joint": joint,
         "told": lambda: _table(answers.rows_of_determined(read_table(_COVERAGE), _CASES)),
         "protocols": protocols_compared,
+        "together": protocols_together,
     },
 }
 """Parts of documents that are written, by what."""

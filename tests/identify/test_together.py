@@ -261,6 +261,7 @@ def test_what_the_test_of_one_sample_says_is_what_scipy_finds() -> None:
     [
         ((1, 1.1, 1.3), (0, 1, 2), "rises with the stress and rises in the order", None),
         ((1, 1.1, 1.3), (1, 2, 0), "It rises with the stress.", None),
+        ((1, 1.1, 1.3), (0, 1, 2, 3), "It rises with the stress.", None),
         ((1, 0.9, 1), (0, 1, 2), "follows neither load nor order", 1),
         ((1.2, 1, 0.9), (1, 2, 0), "It falls with the stress.", None),
     ],
@@ -269,6 +270,7 @@ def test_traces_that_differ_are_named(
     gains: tuple[float, ...], order: tuple[int, ...], said: str, odd: int | None
 ) -> None:
     traces = creep(8, gains)
+    traces += creep(80, gains)[:1]
     sample = together([traces[number] for number in order])
     assert sample.status == "rejected"
     assert sample.agreement.odd == odd
@@ -288,7 +290,9 @@ def test_a_doubted_trace_makes_its_sample_doubtful() -> None:
 def test_traces_of_several_units_are_refused() -> None:
     traces = creep(1)
     moved = {**traces[0], "reads": "displacement"}
-    with pytest.raises(BiogripError, match="trace 2: found another sample than of trace 1"):
+    with pytest.raises(
+        BiogripError, match="trace 2: found zener_kelvin in N/m, 95 % limits, allowed"
+    ):
         library.identify_together(
             [{**traces[0], "reads": "strain"}, moved], model="zener_kelvin", config=NONE
         )

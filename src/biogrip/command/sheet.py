@@ -145,10 +145,10 @@ def by_sample(asked: Sequence[Asked], *, together: bool = False) -> Iterator[Ask
 
     Of other cells, those that differ within a sample stand side by side.
     """
-    samples = defaultdict[str, list[Asked]](list)
-    for own in asked:
+    samples = defaultdict[str | int, list[Asked]](list)
+    for number, own in enumerate(asked):
         cells = {_plain(name): cell for name, cell in own.copied.items()}
-        samples[_TOGETHER if together else cells.get(_SAMPLE) or own.name].append(own)
+        samples[_TOGETHER if together else cells.get(_SAMPLE) or number].append(own)
     for name, traces in samples.items():
         first, cells = traces[0], {}
         for column in first.copied:

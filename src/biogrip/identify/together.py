@@ -21,15 +21,7 @@ from biogrip.fit.problem import Fit, TraceProblem
 from biogrip.identify.data import judged_data, moduli_between
 from biogrip.judging.agreement import Agreement, compare_traces, shared_freedom
 from biogrip.judging.diagnosis import Diagnosis, lower_fit, profile_all, with_notes, with_times
-from biogrip.judging.doubts import (
-    DOUBT,
-    DOUBTFUL,
-    REJECTED,
-    REJECTION,
-    Note,
-    find_reasons,
-    order_notes,
-)
+from biogrip.judging.doubts import REJECTED, REJECTION, Note, find_reasons, order_notes
 from biogrip.judging.likelihood import Likelihood, find_thresholds
 from biogrip.judging.without_model import KINDS, WithoutModel, tell_without_model
 from biogrip.physics.protocol import largest_load
@@ -37,8 +29,6 @@ from biogrip.physics.protocol import largest_load
 # What a stiffness does, and what two explanations of that leave open.
 _WAYS = {1: "rises", -1: "falls"}
 _NOT_TOLD = ": repeat the first trace at the end to tell which"
-# What the status of a trace by itself is to the joint fit.
-_WEIGHTS = {DOUBTFUL: DOUBT, REJECTED: REJECTION}
 
 
 @dataclass(frozen=True, repr=False)
@@ -69,14 +59,11 @@ class Together(Diagnosis):
         """Return what is said of the sample and not of one trace, as plain data."""
         agreement, rejected, count = self.agreement, self.status == REJECTED, len(self.traces)
         covered_s = self.likelihood.problem.residuals.covered_s
-        told: dict[str, Any] = {
-            "holds": agreement.holds,
-            "p": agreement.chance,
-            "increase": agreement.increase,
-        }
+        told: dict[str, Any] = {"holds": agreement.holds, "p": agreement.chance}
+        told |= {"increase": agreement.increase, "degrees_of_freedom": agreement.freedom}
         ratios = agreement.ratios(np.full(count, 1 / count)).tolist()
         odd = None if agreement.odd is None else self.names[agreement.odd]
-        told |= {"degrees_of_freedom": agreement.freedom, "odd": odd, "stiffness_over_mean": ratios}
+        told |= {"odd": odd, "stiffness_over_mean": ratios}
         return {
             **judged_data(self),
             **{"noise_model": None, "preferred_model": None, "advice": None},
@@ -103,12 +90,11 @@ def identify_sample_of(names: Sequence[str], diagnoses: Sequence[Diagnosis]) -> 
         If traces have not the same sample model, fixed parameters, unit of stiffness, confidence.
     """
     experiments = [diagnosis.identified[1] for diagnosis in diagnoses]
-    first = experiments[0]
-    for name, other in zip(names, experiments, strict=True):
-        for what in ("sample", "fixed", "confidence"):
-            if (found := getattr(other, what)) != (given := getattr(first, what)):
-                text = f"{name}: found another {what} than of {names[0]}, {found} and {given}"
-                raise BiogripError(f"{text}; allowed is one for all traces of a sample.")
+    first, said = experiments[0], [_taken(experiment) for experiment in experiments]
+    for name, words in zip(names, said, strict=True):
+        if words != said[0]:
+            text = f"{name}: found {words}, allowed is as of {names[0]}"
+            raise BiogripError(f"{text}, with which it is of one sample: {said[0]}.")
     singles = [_with_start(diagnosis) for diagnosis in diagnoses]
     parts, noise_sd = [one.problem for one in singles], np.array([one.noise_sd for one in singles])
     problem, starts = stack(parts, noise_sd), np.array([one.best for one in singles])
@@ -118,10 +104,8 @@ def identify_sample_of(names: Sequence[str], diagnoses: Sequence[Diagnosis]) -> 
     rngs = [first.stream("together")]
     (best_fit,) = identify_many([problem], first.least_squares, rngs, further=[starts])
     freedom = shared_freedom(np.log(best_fit.parameters), singles)
-    problem, thresholds = (
-        stack(parts, noise_sd, freedom),
-        find_thresholds(first.confidence, freedom),
-    )
+    problem = stack(parts, noise_sd, freedom)
+    thresholds = find_thresholds(first.confidence, freedom)
     lower: Fit | None = best_fit
     while lower is not None:
         best_fit, best = lower, np.log(lower.parameters)
@@ -132,11 +116,19 @@ def identify_sample_of(names: Sequence[str], diagnoses: Sequence[Diagnosis]) -> 
     if not agreement.holds:
         notes.append(Note(REJECTION, _differences(names, diagnoses, agreement)))
     for name, one in zip(names, diagnoses, strict=True):
-        weight, why = _WEIGHTS.get(one.status), " ".join(find_reasons(order_notes(one.notes)))
-        notes += [Note(weight, f"{name}, by itself {one.status}: {why}")] if weight else []
+        if why := find_reasons(heaviest := order_notes(one.notes)):
+            text = f"{name}, by itself {one.status}: {' '.join(why)}"
+            notes.append(Note(heaviest[0].weight, text))
     judged = with_notes(replace(judged, converged=best_fit.converged), notes)
     of_joint = {**vars(with_times([judged])[0]), "experiment": first}
     return Together(**of_joint, names=tuple(names), traces=tuple(diagnoses), agreement=agreement)
+
+
+def _taken(experiment: Experiment) -> str:
+    """Say what all traces of a sample have in common."""
+    sample, fixed = experiment.sample, [f"{name} = {it:g}" for name, it in experiment.fixed.items()]
+    level = f"{100 * experiment.confidence:g} % limits"
+    return f"{sample.candidate} in {sample.stiffness or '1'}, {', '.join([*fixed, level])}"
 
 
 def _with_start(diagnosis: Diagnosis) -> Likelihood:

@@ -15,7 +15,6 @@ References
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 from scipy.special import fdtrc, stdtrit
@@ -73,18 +72,16 @@ class Agreement:
         """Return 1 if the ratio of stiffness rises with what differs, -1 if it falls, else 0.
 
         From its least to its largest value, (n_traces,), the ratio differs, and no step between
-        goes the other way (`ONE_SAMPLE`).
+        goes the other way, or is one between equal values (`ONE_SAMPLE`).
         """
-        order = np.argsort(what, kind="stable").tolist()
-
-        def step(one: int, other: int) -> int:
-            contrast = np.eye(len(what))[other] - np.eye(len(what))[one]
-            least = self.roots[1] * float(np.sqrt(contrast @ self.covariance @ contrast))
-            by = float(contrast @ self.log_ratios)
-            return int(np.sign(by)) if abs(by) > least else 0
-
-        whole = step(order[0], order[-1]) if len({*what}) == len(what) else 0
-        return 0 if -whole in [step(*pair) for pair in pairwise(order)] else whole
+        order = np.argsort(what, kind="stable")
+        apart = np.subtract.outer(self.log_ratios, self.log_ratios)[order][:, order].T
+        own = np.diagonal(self.covariance)
+        sd = np.sqrt(np.add.outer(own, own) - 2 * self.covariance)[order][:, order]
+        signs = np.where(np.abs(apart) > self.roots[1] * sd, np.sign(apart), 0.0)
+        steps, equal = np.diagonal(signs, 1), np.diff(np.take(what, order)) == 0
+        right = (steps == 0) | ((steps == signs[0, -1]) & ~equal)
+        return int(signs[0, -1]) if np.all(right) else 0
 
 
 def compare_traces(likelihood: Likelihood, singles: Sequence[Likelihood]) -> Agreement:
@@ -97,7 +94,7 @@ def compare_traces(likelihood: Likelihood, singles: Sequence[Likelihood]) -> Agr
     singles
         Of each trace: its problem in the joint one, its optimum, noise and freedom.
     """
-    own = [_own_fit(single, likelihood.best) for single in singles]
+    own = [_best([one.problem] * 2, [one.best, likelihood.best], one) for one in singles]
     increase, freedom, chance = _increase(likelihood, own)
     log_ratios, covariance, fall = _fit_ratios(likelihood, singles)
     common, more = _common(own, np.ones(len(own))), len(own) - 1
@@ -143,12 +140,8 @@ def _told(likelihood: Likelihood) -> int:
     return int(np.count_nonzero(sizes > levels.TELLS))
 
 
-def _own_fit(single: Likelihood, other: Array) -> Likelihood:
-    """Return the likelihood of a trace at its own best fit, in the ranges of all traces."""
-    return _best([single.problem] * 2, [single.best, other], single)
-
-
 def _best(problems: list[TraceProblem], starts: list[Array], like: Likelihood) -> Likelihood:
+    """Return a likelihood like another one, of a problem's best fit from several starts."""
     fits = fit_from(problems, np.array(starts))
     lowest = int(np.argmin(fits.misfit))
     given = {"best": fits.x[lowest], "misfit": float(fits.misfit[lowest])}
