@@ -313,7 +313,7 @@ def test_what_the_window_does_not_do_is_told(
         ("as by --reading 'storage=G'\"'\"' (Pa)'.", ["--reading", "storage=G' (Pa)"]),
         ("goes with it: (--offset) or --no-drift,", ["--offset", "--no-drift"]),
         ("(by --set measurement.time_unit=UNIT); allowed are s, N m.", ["s", "N m"]),
-        ("a column of it by --load, or --config; --start SECONDS; --reading loss=COLUMN.", []),
+        ("by --time and --load, or --config; --start SECONDS; --reading loss=COLUMN.", []),
     ],
 )
 def test_remedies_are_options_that_a_message_names(message: str, typed: list[str]) -> None:

@@ -30,7 +30,7 @@ _OF_TIME, _OF_SWEEPS = {"time", "hold", "load", "ramp", "contact", "start", "off
 _TAKES_VALUE = {name: bool(metavar) for of in GROUPS.values() for name, metavar, *_ in of}
 _TAKES_VALUE |= {"--no-offset": False, "--no-drift": False, "--no-compare": False}
 _OPTION = re.compile(r"(--[a-z-]+)(?: ((?:'[^']*'|\"[^\"]*\"|[^\s'\"])+?))?(?=[.,;:)]*(?:\s|$))")
-_PLACEHOLDER = re.compile(r"(^|=)[A-Z]+$")
+_PLACEHOLDER = re.compile(r"(^|=)[A-Z]+$|^(and|or)$")
 _UNITS_ALLOWED = re.compile(r"allowed are ([^.;:]+?)(?:, or |, by |[.;]|$)")
 
 
