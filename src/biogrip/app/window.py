@@ -87,7 +87,7 @@ class Window:
         return ["identify", *self.inputs, *options_typed(self.chosen), *self.config]
 
     def look(self) -> None:
-        """Read the first trace; if nothing is chosen yet, choose what names of columns tell."""
+        """Read the first trace; if it has not what is chosen, choose what names of columns tell."""
         first = next((name for name in self.names if name not in self.inputs), self.names[0])
         now = first, (self.folder / first).stat().st_mtime_ns, self.chosen["block"]
         if now == self.looked_at:
@@ -99,7 +99,7 @@ class Window:
         numbers = numbers_in(self.sheet, self.table)
         every = (self.table.end - self.table.first) // _MOST_POINTS + 1
         self.points = {name: [f"{it:.8g}" for it in own[::every]] for name, own in numbers.items()}
-        if not self.chosen["column"]:
+        if self.chosen["column"] not in numbers:
             self.chosen |= likely_choices(numbers)
 
     def check(self) -> None:
@@ -165,7 +165,8 @@ class Window:
 
     def said(self, stream: str) -> str:
         """Return what the command has printed, but for the files that it has written."""
-        return self.shown((self.out / stream).read_text("utf-8").partition("\nWritten to ")[0])
+        said = (self.out / stream).read_text("utf-8", "replace")
+        return self.shown(said.partition("\nWritten to ")[0])
 
     def compare(self) -> None:
         """Compare groups of the traces, by columns of their table."""
