@@ -15,9 +15,11 @@ import pytest
 from flask.testing import FlaskClient
 from playwright.sync_api import Page, expect
 
+import biogrip.app.window as window_of
 from biogrip.app.choices import CHOICES, KNOWN, likely_choices, options_typed, remedies_in
 from biogrip.app.server import app_of
 from biogrip.app.window import Window
+from biogrip.cli import main
 from biogrip.physics.models import CANDIDATES, MODELS
 from biogrip.records import read_table
 from biogrip.traces.tables import numbers_in, overview
@@ -192,6 +194,18 @@ def test_what_is_missing_or_stopped_is_told_and_mended_in_place(
     window.select_option("#time", "clock")
     choose(window, {"hold": "5 Pa"})
     window.click("button:text-is('ms')")
+    picture = window.locator("#picture svg")
+    expect(picture).to_have_attribute("data-unit", "0.001")
+    picture.scroll_into_view_if_needed()
+    box = picture.bounding_box()
+    assert box
+    window.mouse.move(box["x"] + box["width"] / 2, box["y"] + 50)
+    window.mouse.down()
+    window.mouse.move(box["x"] + box["width"], box["y"] + 60)
+    window.mouse.up()
+    expect(window.locator("#typed")).to_contain_text("--until 29.9")
+    assert 10 < float(window.input_value("#from")) < 20
+    expect(window.locator("#picture rect")).to_have_count(1)
     expect(window.locator("#typed")).to_contain_text("--set measurement.time_unit=ms")
     expect(window.locator("#files")).to_contain_text("clock, in ms")
     choose(window, {"model": "generalized_maxwell_2"})
@@ -265,6 +279,45 @@ def test_others_are_refused(
         assert sent.status_code == status
 
 
+def test_who_sends_too_much_is_refused(client: FlaskClient) -> None:
+    client.application.config["MAX_CONTENT_LENGTH"] = 1000
+    data = {"files": (BytesIO(b"1" * 2000), "a.csv")}
+    sent = client.post(f"/{TOKEN}/one/files", base_url=HOST, headers=ORIGIN, data=data)
+    assert sent.status_code == 413
+
+
+@pytest.mark.nightly
+def test_a_command_that_takes_too_long_is_stopped(
+    client: FlaskClient, windows: dict[str, Window], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(window_of, "LONGEST_S", 2)
+    post(client, "example", do="the gripper")
+    post(client, "choose", model="generalized_maxwell_2")
+    post(client, "start")
+    work = windows["one"].work
+    assert work
+    assert work.wait(60) == 128 + signal.SIGINT
+    assert "no file was left half-written" in post(client, "show")
+
+
+def test_without_its_libraries_it_says_what_brings_them(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.delitem(sys.modules, "biogrip.app.server")
+    monkeypatch.setitem(sys.modules, "waitress", None)
+    assert main(["app"]) == 1
+    assert "needs waitress: python -m pip install '.[app]'" in capsys.readouterr().err
+
+
+def test_no_other_command_loads_them() -> None:
+    typed = "main(['identify', 'no_such.csv', '--model', 'maxwell'])"
+    code = f"import sys; from biogrip.cli import main; {typed}; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert {"biogrip.command.files"} == {*done.stdout.split()} & {
+        *("biogrip.command.files", "flask", "werkzeug", "waitress", "biogrip.app")
+    }
+
+
 def post(client: FlaskClient, action: str, **form: Any) -> str:
     sent = client.post(f"/{TOKEN}/one/{action}", base_url=HOST, headers=ORIGIN, data=form)
     assert sent.status_code == 200
@@ -313,7 +366,7 @@ def test_what_the_window_does_not_do_is_told(
         ("as by --reading 'storage=G'\"'\"' (Pa)'.", ["--reading", "storage=G' (Pa)"]),
         ("goes with it: (--offset) or --no-drift,", ["--offset", "--no-drift"]),
         ("(by --set measurement.time_unit=UNIT); allowed are s, N m.", ["s", "N m"]),
-        ("a column of it by --load, or --config; --start SECONDS; --reading loss=COLUMN.", []),
+        ("by --time and --load, or --config; --start SECONDS; --reading loss=COLUMN.", []),
     ],
 )
 def test_remedies_are_options_that_a_message_names(message: str, typed: list[str]) -> None:

@@ -30,7 +30,7 @@ _OF_TIME, _OF_SWEEPS = {"time", "hold", "load", "ramp", "contact", "start", "off
 _TAKES_VALUE = {name: bool(metavar) for of in GROUPS.values() for name, metavar, *_ in of}
 _TAKES_VALUE |= {"--no-offset": False, "--no-drift": False, "--no-compare": False}
 _OPTION = re.compile(r"(--[a-z-]+)(?: ((?:'[^']*'|\"[^\"]*\"|[^\s'\"])+?))?(?=[.,;:)]*(?:\s|$))")
-_PLACEHOLDER = re.compile(r"(^|=)[A-Z]+$")
+_PLACEHOLDER = re.compile(r"(^|=)[A-Z]+$|^(and|or)$")
 _UNITS_ALLOWED = re.compile(r"allowed are ([^.;:]+?)(?:, or |, by |[.;]|$)")
 
 
@@ -44,10 +44,9 @@ def likely_choices(numbers: Mapping[str, Array]) -> dict[str, str]:
         words = plain_name(name).replace("_", " ")
         likely = (own for own, pattern in KNOWN["words"].items() if re.search(pattern, words))
         columns.setdefault(next(likely, "other"), name)
-    swept = [name for name in columns if name in INSTRUMENTS and INSTRUMENTS[name].sweeps]
-    read = swept if "frequency" in columns else [own for own in INSTRUMENTS if own in columns]
-    reading = max(read, key=lambda name: INSTRUMENTS[name].relative, default="strain")
-    load = "" if INSTRUMENTS[reading].relative else INSTRUMENTS[reading].controlled.name
+    read = [it for name, it in INSTRUMENTS.items() if name in columns]
+    likely_one = max(read, key=lambda it: it.sweeps + it.relative, default=INSTRUMENTS["strain"])
+    reading, load = likely_one.read.name, likely_one.controlled.name * (not likely_one.relative)
     if {load, reading} <= {*columns}:
         load, reading = sorted((load, reading), key=lambda name: _steps(numbers[columns[name]]))
     partner = next((name for name in PARTNERS if name in columns), "")

@@ -30,11 +30,10 @@ try:
 except ModuleNotFoundError as error:
     raise BiogripError(f"app: needs {error.name}: python -m pip install '.[app]'") from error
 
-_HERE = Path(__file__).parent
+_HERE, _DATA = Path(__file__).parent, Path(__file__).parents[3] / "data"
 _OUTPUTS = "page.html", "figure.png", "table.csv", "result.json", "groups.csv", "groups.png"
 _POLICY = "default-src 'self' 'unsafe-inline'; img-src 'self' data:; frame-ancestors 'self'"
-_HEADERS = {"Referrer-Policy": "same-origin", "X-Content-Type-Options": "nosniff"}
-_HEADERS |= {"Content-Security-Policy": _POLICY, "Cache-Control": "no-store"}
+_HEADERS = {"Content-Security-Policy": _POLICY, "X-Content-Type-Options": "nosniff"}
 _SHOWN = {
     **{"known": KNOWN, "instruments": INSTRUMENTS, "limits": (LARGEST_MB, LONGEST_S // 60)},
     **{"candidates": CANDIDATES, "shapes": KNOWN_SHAPES, "units": TIME_UNITS, "outputs": _OUTPUTS},
@@ -78,7 +77,7 @@ def app_of(windows: dict[str, Window], token: str) -> Flask:
 
     @app.after_request
     def limit_page(response: Response) -> Response:
-        """Let no page load anything else, nor tell its address."""
+        """Let no page load anything from elsewhere."""
         response.headers.update({**_HEADERS, **response.headers})
         return response
 
@@ -119,10 +118,10 @@ def _do(action: str, window: Window) -> None:
         for file in request.files.getlist("files"):
             window.add(file.filename or "", file.stream)
     elif action == "example":
-        name = KNOWN["examples"][do]["file"]
-        path = next(_HERE.glob(f"examples/{name}"), _HERE.parents[2] / "data" / name)
-        window.names, window.chosen = [], {**dict.fromkeys(CHOICES, ""), **KNOWN["examples"][do]}
-        window.add(name, BytesIO(path.read_bytes()))
+        known = KNOWN["examples"][do]
+        path = next(_HERE.glob(f"examples/{known['file']}"), _DATA / known["file"])
+        window.names, window.config, window.chosen = [], [], dict.fromkeys(CHOICES, "") | known
+        window.add(path.name, BytesIO(path.read_bytes()))
     elif action == "option":
         option, _, value = do.partition(" ")
         window.chosen |= with_option(option, value, window.chosen["more"])

@@ -40,8 +40,8 @@ class Window:
     folder: Path
     """Folder of the files; what the command writes is in others beside it."""
     names: list[str] = field(default_factory=list)
-    config: str = ""
-    """Name of a dropped config."""
+    config: list[str] = field(default_factory=list)
+    """The option with the name of a dropped config."""
     chosen: dict[str, str] = field(default_factory=lambda: dict.fromkeys(CHOICES, ""))
     lock: Lock = field(default_factory=Lock)
     sheet: Sheet | None = None
@@ -51,6 +51,8 @@ class Window:
     """That of the tables in it that is shown."""
     points: dict[str, list[str]] = field(default_factory=dict)
     """Numbers of its columns, of some rows."""
+    looked_at: tuple[str, int, str] = "", 0, ""
+    """The file, its time and the block, of which these are."""
     command: str = ""
     """What gives the same in a terminal."""
     problem: str = ""
@@ -69,7 +71,7 @@ class Window:
         """Keep a file under a name of letters, digits and few marks, in no other folder."""
         plain = _UNSAFE.sub("_", re.split(r"[/\\]", name)[-1])[-_LONGEST_NAME:] or "_"
         if plain.endswith((".yaml", ".yml")):
-            self.config = plain
+            self.config = ["--config", plain]
         else:
             self.names = [*dict.fromkeys([*self.names, plain])]
         (self.folder / plain).write_bytes(content.read())
@@ -82,29 +84,30 @@ class Window:
     @property
     def typed(self) -> list[str]:
         """The command as it is typed, but for what it writes."""
-        typed = ["identify", *self.inputs, *options_typed(self.chosen)]
-        return [*typed, "--config", self.config] if self.config else typed
+        return ["identify", *self.inputs, *options_typed(self.chosen), *self.config]
 
     def look(self) -> None:
-        """Read the first trace; if nothing is chosen yet, choose what names of columns tell."""
+        """Read the first trace; if it has not what is chosen, choose what names of columns tell."""
         first = next((name for name in self.names if name not in self.inputs), self.names[0])
+        now = first, (self.folder / first).stat().st_mtime_ns, self.chosen["block"]
+        if now == self.looked_at:
+            return
+        self.looked_at, self.table = now, None
         self.sheet, self.tables = overview(self.folder / first)
         block, longest = self.chosen["block"], max(self.tables, key=lambda it: it.end - it.first)
         self.table = {f"{n}": table for n, table in enumerate(self.tables, 1)}.get(block, longest)
         numbers = numbers_in(self.sheet, self.table)
         every = (self.table.end - self.table.first) // _MOST_POINTS + 1
         self.points = {name: [f"{it:.8g}" for it in own[::every]] for name, own in numbers.items()}
-        if not self.chosen["column"]:
+        if self.chosen["column"] not in numbers:
             self.chosen |= likely_choices(numbers)
 
     def check(self) -> None:
         """Find out what the command would do with what is chosen."""
-        self.command, self.problem, self.table, self.traces = "", "", None, []
-        self.recording = None
+        self.command, self.problem, self.traces, self.recording = "", "", [], None
         try:
             self.look()
-            typed = join(["biogrip", *self.typed])
-            self.command = f"{typed} --report page.html --csv table.csv"
+            self.command = join(["biogrip", *self.typed]) + " --report page.html --csv table.csv"
             self.traces = self._traces()
             check_settings(self.traces[:_CHECKED])
             self.recording, _ = read_trace(self.traces[0])
@@ -118,7 +121,7 @@ class Window:
         if others := {*given} - allowed:
             raise BiogripError(f"--{min(others)}: not here; download results, drop a config.")
         files = [self.folder / name for name in self.inputs]
-        config = self.folder / self.config if self.config else None
+        config = self.folder / self.config[1] if self.config else None
         traces = traces_of(files, config, given["settings"])
         for own in traces:
             if own.trace.resolve().parent != self.folder.resolve():
@@ -132,8 +135,7 @@ class Window:
     @property
     def running_s(self) -> int:
         """How long the command runs, at least 1; 0 if it does not."""
-        runs = self.work is not None and self.work.poll() is None
-        return int(time.time() - self.started) + 1 if runs else 0
+        return int(time.time() - self.started) + 1 if self.work and self.work.poll() is None else 0
 
     @property
     def of_table(self) -> bool:
@@ -163,7 +165,8 @@ class Window:
 
     def said(self, stream: str) -> str:
         """Return what the command has printed, but for the files that it has written."""
-        return self.shown((self.out / stream).read_text("utf-8").partition("\nWritten to ")[0])
+        said = (self.out / stream).read_text("utf-8", "replace")
+        return self.shown(said.partition("\nWritten to ")[0])
 
     def compare(self) -> None:
         """Compare groups of the traces, by columns of their table."""
