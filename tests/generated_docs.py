@@ -4,10 +4,12 @@ import ast
 import json
 import re
 import shlex
+import shutil
 import textwrap
 from collections import Counter
 from collections.abc import Callable, Iterable
 from contextlib import redirect_stderr, redirect_stdout, suppress
+from difflib import get_close_matches
 from functools import cache
 from io import StringIO
 from itertools import islice
@@ -41,6 +43,7 @@ from biogrip_study.records.identifications import share_in_words
 from tests.helpers.default import STUDY, study_of
 from tests.helpers.key_reference import file_schema, reference
 from tests.helpers.places import EXAMPLE, ROOT
+from tests.helpers.runs import ran
 from tests.published_numbers import renewed_numbers
 from workflow.paper.claims import Results, add_columns, judge_all
 
@@ -483,7 +486,21 @@ def renewed(path: Path) -> str:
         if match is None:
             raise ValueError(f"{path}: has no part {name} to be written.")
         text = f"{text[: match.start(1)]}\n{content()}\n\n{text[match.end(1) :]}"
-    return renewed_numbers(text)
+    return renewed_numbers(SHOWN.sub(_printed_again, text))
+
+
+SHOWN = re.compile(r"^```sh\n(biogrip identify data/[^`]*)```[^`]*^```text\n(.*?)^```", re.S | re.M)
+"""Commands, and lines of what they print."""
+
+
+def _printed_again(shown: re.Match[str]) -> str:
+    """Type commands, and put in the place of each line the one printed that is most like it."""
+    with TemporaryDirectory() as folder:
+        shutil.copytree(ROOT / "data", Path(folder, "data"))
+        typed = [shlex.split(line, comments=True) for line in shown[1].splitlines()]
+        said = "".join(ran(Path(folder), *each, PYTHONPATH=str(ROOT / "src")) for each in typed)
+    lines = [get_close_matches(it, said.splitlines(), 1, 0.0)[0] for it in shown[2].splitlines()]
+    return shown[0].replace(shown[2], "".join(f"{line}\n" for line in lines))
 
 
 if __name__ == "__main__":

@@ -92,7 +92,7 @@ def test_the_page_answers_first_and_from_its_tables(opened: Opened, report: Path
     expected = [f"{row['shown_determined']} of {row['shown_seeds']}" for row in counts]
     assert [" ".join(it.split()[1:]) for it in table.locator("td").all_inner_texts()] == expected
     # Wilson's limits of 0 of 1 and 1 of 1.
-    said = " ".join(page.locator(".wide + p.soft").inner_text().split())
+    said = " ".join(page.locator(".narrow + p.soft").inner_text().split())
     assert "0 of 1 means at most 79 % of all traces, 1 of 1 at least 21 %. Sums hold" in said
     assert table.evaluate("it => it.getBoundingClientRect().bottom") < 900
     told = page.locator("#tables summary").all_text_contents()

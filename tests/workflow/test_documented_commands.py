@@ -16,7 +16,6 @@ import yaml
 from tests.helpers.places import ROOT
 from tests.helpers.runs import SMALL, clone, ran
 
-SHOWN = re.compile(r"^```sh\n(biogrip identify data/[^`]*)```[^`]*^```text\n(.*?)^```", re.S | re.M)
 BLOCK = re.compile(r'^```(\w+)(?: title="([^"]+)")?\n(.*?)^```$', re.DOTALL | re.MULTILINE)
 # Those that change the copy's code come last.
 HOWTOS = sorted(
@@ -76,18 +75,6 @@ def test_what_is_said_can_be_done(document: str, place: Path) -> None:
             commands = [[sys.executable, "-c", content]]
         for command in commands:
             ran(place, *command, PYTHONPATH=str(place / "src"))
-
-
-@pytest.mark.nightly
-def test_what_is_shown_is_printed(tmp_path: Path) -> None:
-    shutil.copytree(ROOT / "data", tmp_path / "data")
-    texts = ((ROOT / "docs" / document).read_text(encoding="utf-8") for document in DOCUMENTS)
-    shown = [pair for text in texts for pair in SHOWN.findall(text)]
-    assert len(shown) > 3
-    for commands, lines in shown:
-        typed = [shlex.split(line, comments=True) for line in commands.splitlines()]
-        printed = [ran(tmp_path, *each, PYTHONPATH=str(ROOT / "src")) for each in typed]
-        assert [line for line in lines.splitlines() if line not in "".join(printed)] == []
 
 
 @pytest.mark.nightly

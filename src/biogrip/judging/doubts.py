@@ -357,8 +357,8 @@ def _about_changes(left: _Left, *, coloured: bool) -> list[str]:
         unit = f" {residuals.instrument.read.unit}".rstrip()
         return [
             f"The readings change at about {plain(0.5 * (before_s + after_s))} s, as by a step of "
-            f"{size}{unit}, which is not white noise ({p_value(step.chance)}): the values may be "
-            "far off. Leave out what is before or after (--from, --until)."
+            f"{size}{unit}: white noise hardly does that ({p_value(step.chance)}), and the values "
+            "may be far off. Leave out what is before or after (--from, --until)."
         ]
     split = middle_of(residuals)
     chance = 1.0 if coloured else whiteness.compare_halves(residual, basis, split)
