@@ -86,6 +86,7 @@ class _Parser(argparse.ArgumentParser):
 
 def _model_lines() -> list[str]:
     """Return the names and titles of the sample models, usual ones first."""
+    from biogrip.physics.drawing import sketched
     from biogrip.physics.models import ALIASES, MODELS
 
     width = max(map(len, MODELS))
@@ -96,14 +97,32 @@ def _model_lines() -> list[str]:
         others = [other for other in (*ALIASES, *MODELS) if ALIASES.get(other, other) == name]
         also = ", ".join(other for other in others if other != usual)
         lines.append(f"  {usual:<{width}}  {MODELS[name].title}" + (f" ({also})" if also else ""))
+        lines.append(f"  {'':<{width}}  {sketched(MODELS[name])}")
     return [*lines, f"  {'jeffreys':<{width}}  Burgers fluid without its spring"]
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(prog="biogrip", description=__doc__)
+class _RaisingParser(_Parser):
+    """The same, of which a usage error is an error to catch."""
+
+    def error(self, message: str) -> NoReturn:
+        """Raise what would be printed."""
+        raise BiogripError(message)
+
+    def exit(self, status: int = 0, message: str | None = None) -> NoReturn:
+        """Do not exit."""
+        raise BiogripError(message or "allowed are options that set something.")
+
+
+def options_of(arguments: Sequence[str]) -> dict[str, Any]:
+    """Return what a command line asks for; what is wrong with it is a `BiogripError`."""
+    return vars(_parser(_RaisingParser).parse_args(arguments))
+
+
+def _parser(kind: type[_Parser] = _Parser) -> argparse.ArgumentParser:
+    parser = kind(prog="biogrip", description=__doc__)
     parser.add_argument("--version", action="version", version=f"biogrip {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    for add in (_add_identify, _add_groups, _add_design):
+    for add in (_add_identify, _add_groups, _add_design, _add_app):
         add(commands)
     return parser
 
@@ -166,6 +185,7 @@ def _add_settings(parser: Any) -> None:
             group = parser.add_argument_group("output")
             _add_file(group, "--report", "PAGE", "HTML page with pictures")
             _add_file(group, "--csv", "TABLE", "CSV file, a row per trace", dest="table")
+            _add_file(group, "--plot", "FIGURE", "PNG file, of one trace: its fit")
             text = "JSON file, of one trace [TRACE.identified.json]"
             _add_file(group, "--output", "FILE", text)
 
@@ -219,3 +239,11 @@ def _add_design(commands: Any) -> None:
     design.add_argument("config", type=Path, help=text)
     text = "config of the designed study, YAML [CONFIG_designed.yaml]"
     _add_file(design, "--output", "OUTPUT", text)
+
+
+def _add_app(commands: Any) -> None:
+    text = "open a window of this machine: drop files, choose, see the answer and its command"
+    app = commands.add_parser("app", help=text, description=text)
+    app.set_defaults(command="biogrip.app.server:open_app")
+    app.add_argument("--port", type=int, metavar="PORT", help="of this machine [any that is free]")
+    app.add_argument("--no-browser", action="store_true", help="print the address only")

@@ -138,6 +138,9 @@ MISSED = 0.05
 """Increase of chi^2, from the weak prior of local fits, beyond which a fit is not the optimum: an
 eightieth of what moves a 95 % limit."""
 
+EXACT = 1e-7
+"""Misfit over the peak below which a fit is not lowered: no instrument reads 24 bits."""
+
 WIDE = 3.0
 """Limits further than this factor from their middle tell little more than an order of magnitude:
 moduli of cells of one kind scatter by a factor of about 2 to 3."""

@@ -136,6 +136,14 @@ class TraceResult:
         lines = (f"  {item['quantity']}  {item['in_words']}" for item in self.data["quantities"])
         return "\n".join([f"{self.data['model_title']}: fit {self.status}", *lines])
 
+    def _repr_html_(self) -> str:
+        """Return status, table and picture, which Jupyter shows."""
+        from biogrip.command.page import address
+
+        table = self.to_frame().to_html(na_rep="", border=0)
+        said = f"<p>{self.data['model_title']}: fit {self.status}</p>"
+        return f'{said}{table}<img src="{address(self.plot())}" width="560">'
+
     def __str__(self) -> str:
         """Return what the command prints."""
         return in_words(self.data)

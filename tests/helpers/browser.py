@@ -10,14 +10,17 @@ from playwright.sync_api import Browser
 class Opened:
     """A page, what went wrong in it, and what it asked for beside itself."""
 
-    def __init__(self, browser: Browser, page: Path, **context: Any) -> None:
+    def __init__(self, browser: Browser, page: Path | str, **context: Any) -> None:
+        address = page if isinstance(page, str) else page.as_uri()
+        # A page from a file asks for nothing; one from an address for what is below that.
+        self._own = (address if address.startswith("http:") else "file:", "data:", "blob:")
         self.problems: list[str] = []
         self.asked: list[str] = []
         self.page = browser.new_page(**context)
         self.page.on("pageerror", lambda error: self.problems.append(str(error)))
         self.page.on("console", self._said)
         self.page.on("request", self._requested)
-        self.page.goto(page.as_uri())
+        self.page.goto(address)
 
     def close(self) -> None:
         assert (self.problems, self.asked) == ([], [])
@@ -28,7 +31,7 @@ class Opened:
             self.problems.append(message.text)
 
     def _requested(self, request: Any) -> None:
-        if not request.url.startswith(("file:", "data:", "blob:")):
+        if not request.url.startswith(self._own):
             self.asked.append(request.url)
 
     def barriers(self, *rules: str) -> list[tuple[str, list[str]]]:

@@ -7,11 +7,12 @@ killed, costs no other its result, and what is done is not done again.
 import os
 import sys
 import traceback
+from base64 import b64decode
 from collections import defaultdict
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
-from multiprocessing import get_context
+from multiprocessing import get_all_start_methods, get_context
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any, TypeVar
@@ -34,7 +35,7 @@ from biogrip.command.words import in_columns, in_words
 from biogrip.config.case import SampleCase
 from biogrip.config.loading import trace_defaults
 from biogrip.errors import BiogripError
-from biogrip.files import digest_of, software
+from biogrip.files import atomic_write, digest_of, software
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.problem import SearchRange
 from biogrip.identify.data import trace_data
@@ -74,15 +75,16 @@ def identify_files(
     output: Path | None = None,
     report: Path | None = None,
     table: Path | None = None,
+    plot: Path | None = None,
     rows: tuple[int, int] | None = None,
     together: bool = False,
 ) -> int:
     """Identify traces and tables of traces, write the results, and print them.
 
     Config and settings are those of all traces. `output` is the JSON file of a single trace, by
-    default one beside each; `report` and `table` are HTML and CSV files to write, if any. `rows`
-    are the first and last sample of a table to identify, from 0, without JSON files; by default
-    all. With `together` all traces are of one sample.
+    default one beside each; `report`, `table` and `plot` are HTML, CSV and PNG files, if any.
+    `rows` are the first and last sample of a table to identify, from 0, without JSON files; by
+    default all. With `together` all traces are of one sample.
 
     Return 1 if any of several traces could not be used. A `BiogripError` says that an option, the
     config or the only trace cannot.
@@ -103,6 +105,9 @@ def identify_files(
         raise BiogripError(absent[asked[0].name])
     if output is not None and not alone:
         raise BiogripError("--output: only for one trace; each of several gets its own file.")
+    if plot is not None and not (alone and plot.suffix == ".png"):
+        text = f"found {visible(plot)}; allowed is a name that ends with .png, of one trace."
+        raise BiogripError(f"--plot: {text} For several there is --report.")
     # Errors of options and config concern all traces: they are raised once, here.
     check_settings(every)
     outputs = [output or own.output for own in every] if rows is None else []
@@ -110,7 +115,7 @@ def identify_files(
     written = [*zip(names, outputs, strict=False), ("--report", report), ("--csv", table)]
     read = [trace.trace for own in every for trace in own.traces]
     check_outputs(written, [*files, *read, *filter(None, [config])])
-    drawn = report is not None and len(every) <= MOST_DRAWN
+    drawn = bool(report or plot) and len(every) <= MOST_DRAWN
     outcome = _identify_traces(every, outputs or None, drawn=drawn)
     if alone and outcome.refused:
         raise BiogripError(outcome.refused[asked[0].name])
@@ -122,10 +127,13 @@ def identify_files(
         from biogrip.command.page import write_page
 
         write_page(outcome, report)
+    if plot is not None and (pictures := outcome.pictures.get(names[0])):
+        with atomic_write(plot) as scratch:
+            scratch.write_bytes(b64decode(pictures[0].partition(",")[2]))
     print(in_words(outcome.found[0]) if alone else in_columns(outcome.found, outcome.refused))
     pairs = zip(every, outputs, strict=False)
     made = [path for own, path in pairs if own.name not in outcome.refused]
-    if said := [visible(path) for path in (*made, report, table) if path]:
+    if said := [visible(path) for path in (*made, report, table, plot) if path]:
         print(f"Written to {', '.join(said)}.")
     return 1 if outcome.refused else 0
 
@@ -162,7 +170,7 @@ def _identify_traces(
         text = f"{len(found)} of {len(asked)} traces are taken from their JSON files, as they and"
         print(f"{text} what is asked have not changed.", file=sys.stderr)
     left = [number for number, own in enumerate(asked) if own.name not in found]
-    processors = len(os.sched_getaffinity(0))
+    processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 2
     size = max(1, min(_MOST_IN_BATCH, -(-len(left) // processors)))
     batches = [left[start : start + size] for start in range(0, len(left), size)]
     every = Outcome([], {})
@@ -200,6 +208,9 @@ def side_by_side(work: Callable[[J], T], jobs: Sequence[J], most: int) -> Iterat
     there at once; they are forked, and end when this one does, however that ends. An error that
     work raises is raised here.
     """
+    if "fork" not in get_all_start_methods():  # on Windows
+        yield from map(work, jobs)
+        return
     fork, parent = get_context("fork"), os.getpid()
     running: dict[Any, tuple[int, Any]] = {}
     done: dict[int, T | None] = {}
@@ -316,16 +327,12 @@ def _diagnosed(
         few = len(recording.time_s) * _MOST_IN_BATCH <= _MOST_READINGS
         alike[budget(experiment), None if few else index].append(index)
 
-    def doing(step: str) -> None:
-        progress.done()
-        progress.doing(step)
-
     groups = [*alike.values()]
     for group in groups:
         traces, failed = [read[index][1] for index in group], dict[str, str]()
         diagnoses: list[Diagnosis] = []
         with _caught(asked[group[0]], failed):
-            diagnoses = identify_alike(traces, progress=progress.within, doing=doing)
+            diagnoses = identify_alike(traces, progress.within, progress.doing)
         yield from zip(group, diagnoses, strict=False)
         # An error is of one of a group: it is then identified one by one.
         if failed and len(group) > 1:

@@ -35,6 +35,8 @@ from biogrip.judging.diagnosis import Diagnosis
 from biogrip.judging.doubts import DOUBTFUL, OK, REJECTED
 from biogrip.judging.without_model import LEVEL, level_turned
 from biogrip.page.templates import data_url, environment
+from biogrip.physics.drawing import sketched
+from biogrip.physics.models import CANDIDATES
 from biogrip.physics.protocol import evaluate, hold, join_phases, largest_load
 from biogrip.physics.simulation import simulated_response
 from biogrip.terminal import visible_lines
@@ -44,8 +46,8 @@ _STATUS_MARKS = {OK: "✓", DOUBTFUL: "!", REJECTED: "✕"}
 _GROUPS_SHOWN, _ALL, _MOST_PANELS = 6, "all traces", 6
 # Most traces whose pictures are open, and printed.
 _MOST_OPEN = 3
-# Times at which a level is drawn.
-_BAND = 25
+# Times at which a level is drawn; size of the picture of a fit, which is read on a telephone, too.
+_BAND, _FIT_IN = 25, (4.4, 3.4)
 
 
 def trace_pictures(diagnosis: Diagnosis, data: Mapping[str, Any]) -> list[str]:
@@ -56,7 +58,7 @@ def trace_pictures(diagnosis: Diagnosis, data: Mapping[str, Any]) -> list[str]:
     drawn, told = draw_best(diagnosis), data["without_model"]["quantities"]
     with style.styled():
         more = [draw_level(diagnosis, data)] if told and diagnosis.recording else []
-        return [_address(picture) for picture in (drawn, draw_profiles_of(data), *more)]
+        return [address(picture) for picture in (drawn, draw_profiles_of(data), *more)]
 
 
 def draw_level(diagnosis: Diagnosis, data: Mapping[str, Any]) -> Figure:
@@ -142,13 +144,16 @@ def draw_best(diagnosis: Diagnosis) -> Figure:
         fit = replace(fit, time_s=fit.time_s + start_s)
     with style.styled():
         drawn = draw_fit({"best fit": fit}, "")
+        drawn.set_size_inches(*_FIT_IN)
         if spread and start_s:
             drawn.axes[-1].set_xlabel(f"time since {start_s:.6g} s of the clock (s)")
     return drawn
 
 
-def _address(drawn: Figure) -> str:
-    return data_url("image/png", style.png_of(drawn, 64))
+def address(drawn: Figure) -> str:
+    """Return a figure as a PNG of few colours, as a data URL."""
+    with style.styled():
+        return data_url("image/png", style.png_of(drawn, 64))
 
 
 def draw_every_trace(outcome: Outcome, columns: Mapping[str, str]) -> tuple[Figure, str]:
@@ -195,7 +200,7 @@ def write_page(outcome: Outcome, page: Path) -> None:
     if several and traces:
         with style.styled():
             drawn, groups = draw_every_trace(outcome, columns)
-            figure_of_all = _address(drawn)
+            figure_of_all = address(drawn)
     outcomes = [(data["trace"], data["fit"], " ".join(data["reasons"])) for data in traces]
     outcomes += [(trace, FAILED, reason) for trace, reason in outcome.refused.items()]
     further = outcome_in_words(outcomes) if several else preferred_in_words(traces[0])
@@ -226,6 +231,7 @@ def write_page(outcome: Outcome, page: Path) -> None:
                 status: sum(data["fit"] == status for data in traces) for status in _STATUS_MARKS
             },
             words=words,
+            drawing_of=lambda name: sketched(CANDIDATES[name].model),
             written_by=f"{WRITTEN_BY} {__version__}",
         )
     )

@@ -194,7 +194,8 @@ def settled(
 
 def lower_fit(judged: Diagnosis, fit: Fit) -> Fit | None:
     """Return the fit from the lowest point of the profiles, if it is below the best fit."""
-    if judged.lowest is None:
+    exact = levels.EXACT * judged.likelihood.problem.residuals.peak
+    if judged.lowest is None or fit.misfit < exact:
         return None
     missed = fit.at(fit_from([judged.likelihood.problem], judged.lowest))
     return None if judged.likelihood.increase(missed.misfit) > -levels.MISSED else missed
@@ -209,13 +210,28 @@ def profiled(likelihood: Likelihood, findings: list[Finding], trades: list[Trade
 
 
 def with_times(diagnoses: Sequence[Diagnosis]) -> list[Diagnosis]:
-    """Return diagnoses with findings on relaxation and retardation times after the others."""
+    """Return diagnoses with findings on relaxation and retardation times after the others.
+
+    A sum that holds provided that branches relax within the experiment has no such condition where
+    the limits of their times say so.
+    """
     likelihoods = [diagnosis.likelihood for diagnosis in diagnoses]
     if not (times := characteristic_times(likelihoods[0].problem.residuals.model)):
         return [*diagnoses]
     every = compute_findings(likelihoods, times)
     pairs = zip(diagnoses, every, strict=True)
-    return [replace(diagnosis, findings=[*diagnosis.findings, *more]) for diagnosis, more in pairs]
+    return [
+        replace(own, findings=[*(_unconditional(each, more, own) for each in own.findings), *more])
+        for own, more in pairs
+    ]
+
+
+def _unconditional(finding: Finding, times: Sequence[Finding], judged: Diagnosis) -> Finding:
+    """Return a finding without the conditions that the limits of relaxation times show to hold."""
+    longest_s = judged.likelihood.problem.residuals.duration_s
+    shown = {each.quantity.members[::-1] for each in times if (each.high or np.inf) < longest_s}
+    left = (it for it in finding.quantity.penalties if it.before or it.branch not in shown)
+    return replace(finding, quantity=replace(finding.quantity, penalties=tuple(left)))
 
 
 def with_notes(judged: Diagnosis, of_rest: list[Note]) -> Diagnosis:

@@ -454,7 +454,7 @@ def _quantities(residuals: Residuals, lags: Lags, times: Sequence[float]) -> Ite
         return
     if not deforms:
         for before_s, at_s in pairwise(inside):
-            name = f"J({before_s:g} to {at_s:g} s)"
+            name = f"J({at_s:g} s) - J({before_s:g} s)"
             yield _Functional(name, "increment", at_s, unit, partial(_rise, before_s))
         per_s = inverse_of(viscosity)
         yield _Functional("slope at the end", "slope", last_s, per_s, _ADDED["per second"])

@@ -8,7 +8,7 @@ from pathlib import Path
 import jinja2
 
 from biogrip.digits import legible
-from biogrip.terminal import visible
+from biogrip.terminal import visible, visible_lines
 
 _FOLDER = Path(__file__).parent
 _SYMBOL = re.compile(r"\b([kc])_(\w)\b")
@@ -26,6 +26,7 @@ def environment(*folders: Path) -> jinja2.Environment:
     templates.filters |= {
         "legible": legible,
         "visible": visible,
+        "visible_lines": visible_lines,
         "symbols": lambda text: _SYMBOL.sub(r"<i>\1</i><sub>\2</sub>", escape(text)),
     }
     templates.globals |= {

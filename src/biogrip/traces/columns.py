@@ -160,6 +160,11 @@ def unit_in_cell(cell: str, allowed: Collection[str]) -> str | None:
     return known_unit(_bare(cell), allowed)
 
 
+def is_unit(cell: str) -> bool:
+    """Return True if a cell is a unit of anything, with brackets or without."""
+    return unit_in_cell(cell, _UNITS) is not None
+
+
 def in_brackets(cell: str) -> bool:
     """Return True if a cell has nothing but brackets and what they hold."""
     return _IN_BRACKETS.fullmatch(cell) is not None

@@ -22,11 +22,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from biogrip.arrays import IntArray
+from biogrip.arrays import Array, IntArray
 from biogrip.digits import counted
 from biogrip.errors import BiogripError
 from biogrip.traces.columns import (
     in_brackets,
+    is_unit,
     listed,
     place,
     plain_name,
@@ -34,7 +35,7 @@ from biogrip.traces.columns import (
     trace_file_problem,
     unit_in_cell,
 )
-from biogrip.traces.measurement_block import MeasurementBlock
+from biogrip.traces.measurement_block import UNREAD, MeasurementBlock
 
 BLANKS = " "
 SEPARATORS = (",", ";", "\t")
@@ -146,6 +147,33 @@ def read_sheet(path: Path, columns: MeasurementBlock) -> Sheet:
         lines = ["\t".join(wide if len(wide) == width else cells) for wide, cells in parted]
     cells, widths = _cells(path, lines, kept, named)
     return Sheet(encoding, separator, cells, widths, kept, headers, without_end)
+
+
+def overview(path: Path) -> tuple[Sheet, list[Table]]:
+    """Read the cells of a text file, and find its tables, whatever columns are to be read.
+
+    A `BiogripError` is as of `read_sheet`.
+    """
+    columns = replace(UNREAD, time="time_s", strain="strain")
+    for _ in range(2):
+        sheet = read_sheet(path, columns)
+        tables = _tables(sheet, columns) or [_likely_table(sheet)]
+        longest = max(tables, key=lambda table: table.end - table.first)
+        # With two of its columns, every table that has them is found; without names, by numbers.
+        words = [name for name in dict.fromkeys(longest.names) if name and not _is_number(name)]
+        first, second, *_ = [*words, "1", "2"]
+        columns = replace(columns, time=first, strain=second)
+    return sheet, tables
+
+
+def numbers_in(sheet: Sheet, table: Table) -> dict[str, Array]:
+    """Return the numbers of each column, (n_rows,), times of day in s; NaN or inf for others."""
+    numbers: dict[str, Array] = {}
+    for index in (index for index, name in enumerate(table.names) if name):
+        cells = [*map(str, sheet.cells[table.first : table.end, index])]
+        number = seconds_or_inf if is_clock(cells) else find_marks(cells, sheet.separator).number
+        numbers.setdefault(table.names[index], np.array([*map(number, cells)], dtype=float))
+    return numbers
 
 
 def _cells(
@@ -476,10 +504,11 @@ def _count_units(cells: Sequence[str], columns: MeasurementBlock, read: Mapping[
 
 
 def _likely_table(sheet: Sheet) -> Table:
-    """Return what may be the table of a file without the columns: names above numbers."""
+    """Return what may be the table of a file without the columns: names above numbers, or units."""
     numbers = [*map(_count_numbers, sheet.cells[:_LINES_SEARCHED])]
     pairs = enumerate(pairwise(numbers))
     at = next((at for at, (here, below) in pairs if below > here == 0), 0)
+    at -= at > 0 and not numbers[at - 1] and sum(map(is_unit, sheet.cells[at])) > 1
     return Table(at, sheet.cells[at, : sheet.widths[at]].tolist(), at + 1, end=at + 1)
 
 

@@ -1,0 +1,412 @@
+"""The window, typed and clicked as its users do, in a browser; and what it refuses."""
+
+import re
+import shlex
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from flask.testing import FlaskClient
+from playwright.sync_api import Page, expect
+
+import biogrip.app.window as window_of
+from biogrip.app.choices import CHOICES, KNOWN, likely_choices, options_typed, remedies_in
+from biogrip.app.server import app_of
+from biogrip.app.window import Window
+from biogrip.cli import main
+from biogrip.physics.models import CANDIDATES, MODELS
+from biogrip.records import read_table
+from biogrip.traces.tables import numbers_in, overview
+from tests.helpers.browser import Opened
+from tests.helpers.identified import write_trace
+from tests.helpers.places import ROOT
+from tests.helpers.runs import ran
+
+DATA = ROOT / "data"
+PHONE = {"width": 400, "height": 800}
+TOKEN = "token"
+# Fits and comparisons take seconds, more where other tests run beside them.
+expect.set_options(timeout=60_000)
+
+
+@pytest.fixture(scope="module")
+def address() -> Iterator[str]:
+    """Of the command as it is typed; what it kept goes when it is stopped."""
+    command = [sys.executable, "-m", "biogrip", "app", "--no-browser"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
+        assert server.stdout
+        place = server.stdout.readline().strip()
+        assert re.fullmatch(r"http://127\.0\.0\.1:\d+/[\w-]{32}/", place)
+        kept = [*Path("/tmp").glob("biogrip_*")]
+        yield place
+        server.send_signal(signal.SIGINT)
+        assert server.wait(20) == 0
+    assert any(not folder.exists() for folder in kept)
+
+
+@pytest.fixture
+def window(visit: Callable[..., Opened], address: str) -> Page:
+    page: Page = visit(address).page
+    page.set_default_timeout(60_000)
+    return page
+
+
+def drop(page: Page, *files: Path) -> None:
+    """Drop files, as from the desktop, and wait until they are read."""
+    contents = [[file.name, [*file.read_bytes()]] for file in files]
+    script = """all => { const data = new DataTransfer();
+        for (const [name, bytes] of all) data.items.add(new File([new Uint8Array(bytes)], name));
+        return data; }"""
+    dropped = page.evaluate_handle(script, contents)
+    page.dispatch_event("#drop", "drop", {"dataTransfer": dropped})
+    for file in files:
+        expect(page.locator("#files")).to_contain_text(file.name)
+
+
+def choose(page: Page, chosen: Mapping[str, str]) -> None:
+    for name, value in chosen.items():
+        if name == "model":
+            page.check(f"#model-{value}")
+        elif name in ("load", "reading", "column"):
+            page.select_option(f"#{name}", value)
+        else:
+            page.fill(f"#{name}", value)
+            page.press(f"#{name}", "Tab")
+    for value in chosen.values():
+        expect(page.locator("#typed")).to_contain_text(value)
+
+
+def identified(page: Page, folder: Path) -> list[dict[str, str]]:
+    """The table that is downloaded, after it is compared with what the shown command writes."""
+    page.click("text=Identify >> nth=-1")
+    link = page.locator("a.button", has_text="table.csv")
+    link.wait_for(timeout=120_000)
+    with page.expect_download() as download:
+        link.click()
+    download.value.save_as(folder / "downloaded.csv")
+    command = shlex.split(page.inner_text("#typed"))
+    assert command[:2] == ["biogrip", "identify"]
+    ran(folder, *command)
+    assert (folder / "downloaded.csv").read_bytes() == (folder / "table.csv").read_bytes()
+    return read_table(folder / "table.csv")
+
+
+def copied(folder: Path, *names: str) -> list[Path]:
+    for name in names:
+        (folder / name).write_bytes((DATA / name).read_bytes())
+    return [folder / name for name in names]
+
+
+def pipette_sheet(folder: Path) -> list[Path]:
+    """Two cells of 500 and 250 Pa, before 400 Pa and 5 s in parallel, with a radius each."""
+    time_s, noise = np.arange(0.5, 30, 0.5), np.random.default_rng(1)
+    rows = ["file;treatment;dish;hold;shape"]
+    for name, k_s, radius_um in (("ä 1.txt", 500, 3.0), ("b.txt", 250, 2.0)):
+        strain = 400 / k_s + 400 / 400 * (1 - np.exp(-time_s / 5))
+        length_um = 3 * 2.1 * radius_um / (2 * np.pi) * strain
+        write_trace(
+            folder / name,
+            time_s,
+            length_um + 0.005 * noise.standard_normal(len(time_s)),
+            header="t [s],L [µm]",
+        )
+        rows.append(
+            f"{name};{'treated' if k_s < 400 else 'control'};1;400 Pa;pipette {radius_um} um"
+        )
+    (folder / "cells.csv").write_text("\n".join(rows) + "\n")
+    return [folder / name for name in ("cells.csv", "ä 1.txt", "b.txt")]
+
+
+def cone(folder: Path) -> list[Path]:
+    """A dwell of a cone of 35 degrees at 500 nm, after 0.1 s; 700 Pa, 800 Pa and 2 s."""
+    time_s = np.arange(0, 12, 0.05)
+    relaxed = 700 + 800 * np.exp(-time_s / 2)
+    force_nN = 2 / np.pi * np.tan(np.radians(35)) / 0.75 * relaxed * 0.5e-6**2 * 1e9
+    force_nN *= 1 + 0.002 * np.random.default_rng(2).standard_normal(len(time_s))
+    depth = np.full(len(time_s), 500.0)
+    write_trace(folder / "cone.csv", time_s, force_nN, depth, header="Time (s),F (nN),Depth (nm)")
+    return [folder / "cone.csv"]
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize(
+    ("files", "chosen", "quantity", "truth"),
+    [
+        (pipette_sheet, {"model": "zener_kelvin"}, "k_s", 500),
+        (cone, {"shape": "cone 35 deg", "model": "zener_maxwell"}, "k_p", 700),
+        (
+            lambda folder: copied(folder, "sweep.csv"),
+            {"model": "springpot_beside_damper"},
+            "k_alpha",
+            600,
+        ),
+        (lambda folder: copied(folder, "example_trace.csv"), {}, "k_p", 5),
+    ],
+    ids=["pipettes", "cone", "sweep", "gripper"],
+)
+def test_a_daily_job_has_the_commands_numbers(
+    window: Page,
+    tmp_path: Path,
+    files: Callable[[Path], list[Path]],
+    chosen: Mapping[str, str],
+    quantity: str,
+    truth: float,
+) -> None:
+    drop(window, *files(tmp_path))
+    choose(window, chosen)
+    window.check("#no-compare")
+    expect(window.locator("#typed")).to_contain_text("--no-compare")
+    row = identified(window, tmp_path)[0]
+    value, low, high = (
+        next(float(cell) for name, cell in row.items() if name.startswith(f"{quantity} {what}"))
+        for what in ("value", "low", "high")
+    )
+    assert low < value < high
+    assert value == pytest.approx(truth, rel=0.03)
+    assert window.frame_locator("iframe").locator("h1").inner_text().startswith("What ")
+    if len(row.get("treatment", "")):
+        expect(window.locator("#result tbody tr")).to_have_count(2)
+        window.select_option("#by", "treatment")
+        window.click("text=Compare >> nth=-1")
+        expect(window.locator("#result")).to_contain_text("biogrip groups table.csv --by=treatment")
+        expect(window.locator("#result figure img")).to_be_visible()
+
+
+@pytest.mark.nightly
+def test_what_is_missing_or_stopped_is_told_and_mended_in_place(
+    window: Page, tmp_path: Path
+) -> None:
+    """A file that is none, a unit, a stop while it fits, a page that is loaded anew."""
+    (tmp_path / "broken.csv").write_bytes(b"PK\x03\x04\x81\x00")
+    drop(window, tmp_path / "broken.csv")
+    expect(window.locator("[role=status] .problem")).to_contain_text("allowed is text in UTF-8")
+    window.click("text=Begin anew")
+    time_s = np.arange(0.5, 30, 0.1)
+    strain = 5 / 500 + 5 / 400 * (1 - np.exp(-time_s / 5))
+    write_trace(tmp_path / "creep.csv", 1e3 * time_s, strain, header="clock,strain")
+    drop(window, tmp_path / "creep.csv")
+    window.select_option("#time", "clock")
+    choose(window, {"hold": "5 Pa"})
+    window.click("button:text-is('ms')")
+    picture = window.locator("#picture svg")
+    expect(picture).to_have_attribute("data-unit", "0.001")
+    picture.scroll_into_view_if_needed()
+    box = picture.bounding_box()
+    assert box
+    window.mouse.move(box["x"] + box["width"] / 2, box["y"] + 50)
+    window.mouse.down()
+    window.mouse.move(box["x"] + box["width"], box["y"] + 60)
+    window.mouse.up()
+    expect(window.locator("#typed")).to_contain_text("--until 29.9")
+    assert 10 < float(window.input_value("#from")) < 20
+    expect(window.locator("#picture rect")).to_have_count(1)
+    expect(window.locator("#typed")).to_contain_text("--set measurement.time_unit=ms")
+    expect(window.locator("#files")).to_contain_text("clock, in ms")
+    choose(window, {"model": "generalized_maxwell_2"})
+    window.click("text=Identify >> nth=-1")
+    window.click("text=Stop >> nth=-1")
+    expect(window.locator("#result [role=alert]")).to_contain_text("no file was left half-written")
+    expect(window.locator("iframe")).to_have_count(0)
+    shown = window.inner_text("main")
+    window.reload()
+    assert window.inner_text("main") == shown
+
+
+def test_a_window_looks_and_tells_without_a_mouse_on_a_phone(
+    visit: Callable[..., Opened], address: str, tmp_path: Path
+) -> None:
+    """Of two windows each has its own; what a file has is text; Axe finds nothing serious."""
+    opened, other = visit(address, viewport=PHONE), visit(address)
+    page, hostile = opened.page, "<img src=x onerror=alert(1)>"
+    time_s = np.arange(0.5, 30, 0.5)
+    file = tmp_path / "a&b <1>.csv"
+    write_trace(file, time_s, 1 + time_s, header=f"time_s,length_um {hostile}")
+    page.set_input_files("#upload", file)
+    expect(page.locator("th", has_text=hostile)).to_be_visible()
+    assert page.locator("th img").count() == 0
+    expect(page.locator("[role=status] .problem")).to_contain_text("--hold: is missing")
+    page.focus("#hold")
+    page.keyboard.type("3 nN")
+    page.keyboard.press("Tab")
+    expect(page.locator("#typed")).to_contain_text("--hold '3 nN'")
+    expect(page.locator("#load")).to_be_focused()
+    assert "a_b _1_.csv" in page.inner_text("#typed")
+    assert page.locator("#picture path").get_attribute("d").count("M") == len(time_s)  # type: ignore[union-attr]
+    assert opened.barriers() == []
+    assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
+    other.page.reload()
+    assert other.page.locator("#typed").count() == 0
+
+
+@pytest.fixture
+def windows(tmp_path: Path) -> dict[str, Window]:
+    (folder := tmp_path / "window").mkdir()
+    return {"one": Window(folder)}
+
+
+@pytest.fixture
+def client(windows: dict[str, Window]) -> FlaskClient:
+    return app_of(windows, TOKEN).test_client()
+
+
+HOST, ORIGIN = "http://127.0.0.1:8123", {"Origin": "http://127.0.0.1:8123"}
+
+
+@pytest.mark.parametrize(
+    ("host", "path", "headers"),
+    [
+        ("http://127.0.0.1:8123", "/", {}),
+        ("http://127.0.0.1:8123", "/other/one/", {}),
+        ("http://evil.example:8123", f"/{TOKEN}/one/", {}),
+        ("http://127.0.0.1:8123", f"/{TOKEN}/one/", {"Origin": "http://evil.example"}),
+        ("http://127.0.0.1:8123", f"/{TOKEN}/one/", {"Origin": "null"}),
+    ],
+)
+def test_others_are_refused(
+    client: FlaskClient, host: str, path: str, headers: dict[str, str]
+) -> None:
+    assert client.get(path, base_url=host, headers=headers).status_code == 403
+    assert client.get(f"/{TOKEN}/one/", base_url=HOST).status_code == 200
+    for own, status in ((headers, 403), (ORIGIN, 200)):
+        given = (path, host) if own is headers else (f"/{TOKEN}/one/", HOST)
+        sent = client.post(f"{given[0]}show", base_url=given[1], headers=own)
+        assert sent.status_code == status
+
+
+def test_who_sends_too_much_is_refused(client: FlaskClient) -> None:
+    client.application.config["MAX_CONTENT_LENGTH"] = 1000
+    data = {"files": (BytesIO(b"1" * 2000), "a.csv")}
+    sent = client.post(f"/{TOKEN}/one/files", base_url=HOST, headers=ORIGIN, data=data)
+    assert sent.status_code == 413
+
+
+@pytest.mark.nightly
+def test_a_command_that_takes_too_long_is_stopped(
+    client: FlaskClient, windows: dict[str, Window], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(window_of, "LONGEST_S", 2)
+    post(client, "example", do="the gripper")
+    post(client, "choose", model="generalized_maxwell_2")
+    post(client, "start")
+    work = windows["one"].work
+    assert work
+    assert work.wait(60) == 128 + signal.SIGINT
+    assert "no file was left half-written" in post(client, "show")
+
+
+def test_without_its_libraries_it_says_what_brings_them(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.delitem(sys.modules, "biogrip.app.server")
+    monkeypatch.setitem(sys.modules, "waitress", None)
+    assert main(["app"]) == 1
+    assert "needs waitress: python -m pip install '.[app]'" in capsys.readouterr().err
+
+
+def test_no_other_command_loads_them() -> None:
+    typed = "main(['identify', 'no_such.csv', '--model', 'maxwell'])"
+    code = f"import sys; from biogrip.cli import main; {typed}; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert {"biogrip.command.files"} == {*done.stdout.split()} & {
+        *("biogrip.command.files", "flask", "werkzeug", "waitress", "biogrip.app")
+    }
+
+
+def post(client: FlaskClient, action: str, **form: Any) -> str:
+    sent = client.post(f"/{TOKEN}/one/{action}", base_url=HOST, headers=ORIGIN, data=form)
+    assert sent.status_code == 200
+    return sent.text
+
+
+def test_names_are_no_paths(
+    client: FlaskClient, windows: dict[str, Window], tmp_path: Path
+) -> None:
+    (tmp_path / "secret.csv").write_text("time_s,strain\n1,2\n")
+    names = "../up.csv", "/etc/b.csv", "..\\c.csv", ".d.csv", "-e.csv", "..", "x\ny.csv"
+    for name in names:
+        post(client, "files", files=(BytesIO(b"time_s,strain\n1,2\n"), name))
+    kept = [*windows["one"].folder.iterdir()]
+    assert {*windows["one"].names} == {path.name for path in kept}
+    assert all(re.fullmatch(r"\w[\w .]*", name) for name in windows["one"].names)
+    assert {path.name for path in tmp_path.iterdir()} == {"secret.csv", "window"}
+    for cell in ("../secret.csv", str(tmp_path / "secret.csv")):
+        page = post(client, "files", files=(BytesIO(f"file\n{cell}\n".encode()), "cells.csv"))
+        assert "allowed are dropped files" in page
+        assert windows["one"].traces == []
+    for name in ("page.html", "..%2Fsecret.csv", "secret.csv"):
+        assert client.get(f"/{TOKEN}/one/out/{name}", base_url=HOST).status_code == 404
+
+
+@pytest.mark.parametrize(
+    "more", ["--report /tmp/x.html", "--config ../x.yaml", "-h", "'", "--typo 1"]
+)
+def test_what_the_window_does_not_do_is_told(
+    client: FlaskClient, windows: dict[str, Window], more: str
+) -> None:
+    post(client, "example", do="the gripper")
+    assert windows["one"].traces
+    post(client, "choose", more=more)
+    assert windows["one"].problem
+    assert windows["one"].traces == []
+    post(client, "start")
+    assert windows["one"].work is None
+
+
+@pytest.mark.parametrize(
+    ("message", "typed"),
+    [
+        ("a: use --rows 'T (C)=20'.", ["--rows", "T (C)=20"]),
+        ("allowed is one, as by --block 1, or", ["--block", "1"]),
+        ("as by --reading 'storage=G'\"'\"' (Pa)'.", ["--reading", "storage=G' (Pa)"]),
+        ("goes with it: (--offset) or --no-drift,", ["--offset", "--no-drift"]),
+        ("(by --set measurement.time_unit=UNIT); allowed are s, N m.", ["s", "N m"]),
+        ("by --time and --load, or --config; --start SECONDS; --reading loss=COLUMN.", []),
+    ],
+)
+def test_remedies_are_options_that_a_message_names(message: str, typed: list[str]) -> None:
+    found = remedies_in(message)
+    told = [word for pair in found for word in pair if word]
+    if "=UNIT" in message:
+        assert [*found.values()] == typed
+        assert told[1::2] == [f"measurement.time_unit={unit}" for unit in typed]
+    else:
+        assert told == typed
+
+
+@pytest.mark.parametrize(
+    ("file", "typed"),
+    [
+        ("pipette.csv", "--reading displacement=length_um --time time_s"),
+        ("afm.csv", "--reading force=force_nN --time time_s --load indentation_nm"),
+        (
+            "sweep.csv",
+            '--reading "storage=G\' (Pa)" --reading "loss=G\'\' (Pa)" '
+            "--frequency 'frequency (Hz)'",
+        ),
+        ("example_trace.csv", "--reading rotation=rotation_rad --time time_s"),
+        ("measured/mucus.csv", "--reading compliance=compliance_per_Pa --time time_s"),
+        ("measured/fish_muscle.csv", "--reading modulus=modulus_Pa --time time_s"),
+    ],
+)
+def test_columns_are_chosen_by_their_names(file: str, typed: str) -> None:
+    sheet, (table,) = overview(DATA / file)
+    chosen = dict.fromkeys(CHOICES, "") | likely_choices(numbers_in(sheet, table))
+    assert options_typed(chosen) == shlex.split(typed)
+
+
+def test_every_model_is_drawn_with_its_elements() -> None:
+    drawings = KNOWN["drawings"]
+    assert {*MODELS} <= {*drawings} <= {*CANDIDATES}
+    for name, groups in drawings.items():
+        text = "".join(branch for group in groups for branch in group)
+        names = [own.name for own in CANDIDATES[name].model.parameters]
+        springpots = sum(own in ("alpha", "beta") for own in names)
+        dampers = sum(own.startswith("c") for own in names)
+        counts = text.count("/\\/\\"), text.count("[==]"), text.count("<>")
+        assert counts == (len(names) - dampers - 2 * springpots, dampers, springpots)
