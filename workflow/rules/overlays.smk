@@ -44,23 +44,30 @@ if STUDY.config.traces:
     # Imported here, for it loads much that a study without a table needs not.
     from biogrip.command.options import Setting
     from biogrip.command.settings import check_settings
-    from biogrip.command.sheet import read_table
+    from biogrip.command.sheet import by_sample, read_table
     from biogrip.config.loading import trace_defaults
 
     MODEL = Setting("traces.model", ("sample", "model"), STUDY.config.traces.model)
     CONFIG = Path(STUDY.config.traces.config) if STUDY.config.traces.config else None
-    ROWS = usable(read_table, Path(STUDY.config.traces.table), CONFIG, [MODEL])
-    usable(check_settings, [row for row in ROWS if row.trace.is_file()])
+    TRACES = usable(read_table, Path(STUDY.config.traces.table), CONFIG, [MODEL])
+    ROWS = [*by_sample(TRACES)]
+    THERE = [row for row in ROWS if all(trace.trace.is_file() for trace in row.traces)]
+    usable(check_settings, THERE)
 
     def rows_of(wildcards):
-        """The rows of the table that a batch has."""
+        """The samples of the table that a batch has, of a trace or several each."""
         first, last = map(int, wildcards.rows.split("-"))
         return ROWS[first : last + 1]
 
     # Batches have fixed rows, so that more rows redo the last at most.
     rule traces_batch:
         input:
-            lambda wildcards: [str(row.trace) for row in rows_of(wildcards) if row.trace.is_file()],
+            lambda wildcards: [
+                str(trace.trace)
+                for row in rows_of(wildcards)
+                for trace in row.traces
+                if trace.trace.is_file()
+            ],
             config=STUDY.config.traces.config or [],
             default=str(trace_defaults()),
             table=ancient(STUDY.config.traces.table),
@@ -80,10 +87,11 @@ if STUDY.config.traces:
             configs=[digest_of(file) for file in (CONFIG, trace_defaults()) if file],
             rows=lambda wildcards: [
                 [
-                    *(str(row.trace), digest_of(row.trace)),
-                    *([[s.path, s.value] for s in row.settings], row.copied),
+                    *(str(trace.trace), digest_of(trace.trace)),
+                    *([[s.path, s.value] for s in trace.settings], trace.copied),
                 ]
                 for row in rows_of(wildcards)
+                for trace in row.traces
             ],
         message:
             "Identifying the traces in rows {wildcards.rows} of {input.table}"

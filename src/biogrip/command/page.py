@@ -116,7 +116,7 @@ def draw_joint(sample: Together) -> Figure:
             axes.plot(at, values_of, ".", color=color, markersize=1.2)
         look = "_" if instrument.sweeps else "-"
         top.plot(at, fit.fitted / load, look, color=color, label=style.literal(name))
-        unit = f"{fit.read.unit or 1}/{instrument.controlled.unit or 1}"
+        unit = f"{fit.read.unit or 1}/{instrument.controlled.unit}".removesuffix("/")
         over = "" if alone else f" over {instrument.controlled.name}"
         top.set_ylabel(with_unit(fit.read.title + over, fit.read.unit if alone else unit))
         below.set_xlabel("angular frequency (rad/s)" if instrument.sweeps else "time (s)")
