@@ -16,16 +16,13 @@ from functools import cached_property
 
 import numpy as np
 
-from biogrip.arrays import Array, IntArray, parts
+from biogrip.arrays import Array, IntArray
 from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.protocol import Course
 from biogrip.physics.rate_tables import DecayTable
 from biogrip.physics.residuals import Residuals
 from biogrip.physics.roots import zeros_of_one_branch
 from biogrip.physics.sample_model import Network, SampleModel
-
-# Individuals computed together: many enough for few calls, few enough for the cache.
-_INDIVIDUALS_AT_ONCE = 7000
 
 Misfit = Callable[[Array], Array]
 """Function from parameters, (n, n_parameters), to RMS misfits in the unit of the readings, (n,)."""
@@ -120,14 +117,6 @@ class SeriesMisfit:
         Populations are (n_populations, n, n_parameters), in the model's order and SI units; traces
         are given by their indices, (n_populations,).
         """
-        populations, size = parameters.shape[:2]
-        some = max(1, _INDIVIDUALS_AT_ONCE // size)
-        misfit = np.empty((populations, size))
-        for these in parts(populations, some):
-            misfit[these] = self._of_some(parameters[these], traces[these])
-        return misfit
-
-    def _of_some(self, parameters: Array, traces: IntArray) -> Array:
         gripper, model, interval_s = self._simulated
         network = model.network(parameters.reshape(-1, parameters.shape[2]))
         static, rates, weights = two_modes(gripper.left, gripper.lever_m, network)
