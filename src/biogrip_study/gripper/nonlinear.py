@@ -75,9 +75,26 @@ class Correction:
 def nonlinear_rotation(
     gripper: Gripper, network: Network, torque: Course, time_s: Array, arm: int = LEFT
 ) -> Array:
-    """Compute the closing rotation of an arm in rad, (n, n_times), by the nonlinear model.
+    """Compute the closing rotation of an arm by the nonlinear model.
 
-    A torque that closes the arms beyond what the model describes is a `BiogripError`.
+    Parameters
+    ----------
+    gripper, network, torque
+        Arms, n samples, and protocol of both arms.
+    time_s
+        Ascending, (n_times,).
+    arm
+        The left or the right arm.
+
+    Returns
+    -------
+    Array
+        Rotation in rad, (n, n_times).
+
+    Raises
+    ------
+    BiogripError
+        If the torque closes the arms beyond what the model describes.
     """
     beyond_linear = correction(gripper, network, torque).checked()
     linear = step_response(gripper, network)
@@ -87,7 +104,20 @@ def nonlinear_rotation(
 def correction(
     gripper: Gripper, network: Network, torque: Course, factors: Array | None = None
 ) -> Correction:
-    """Compute nonlinear minus linear rotation of samples, with factors on their torques, (n,)."""
+    """Compute nonlinear minus linear rotation and jaw force of samples.
+
+    Parameters
+    ----------
+    gripper, network, torque
+        Arms, n samples, and protocol of both arms.
+    factors
+        By which the torque on each sample is multiplied, (n,); by default 1.
+
+    Returns
+    -------
+    Correction
+        Where sweeps did not converge, it says so.
+    """
     arms = [gripper.left] if gripper.left == gripper.right else [gripper.left, gripper.right]
     response = step_response(gripper, network, inertia=False)
     edges = _mesh(torque)

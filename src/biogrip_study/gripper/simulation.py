@@ -24,9 +24,23 @@ def jaw_force(
     nonlinear: bool,
     inertia: bool = True,
 ) -> Array:
-    """Compute the jaws' force on the sample in N, positive while they press, (n, n_times).
+    """Compute the jaws' force on the sample by either model.
 
-    By either model; at the instant of a step: what follows it. Without inertia, it may jump.
+    Parameters
+    ----------
+    gripper, network, course
+        Arms, n samples, and protocol of both arms.
+    time_s
+        Ascending, (n_times,); at the instant of a step: what follows it.
+    nonlinear
+        By the nonlinear model, which has the errors of `nonlinear_rotation`.
+    inertia
+        With the inertia of the arms; without, the force may jump.
+
+    Returns
+    -------
+    Array
+        Force in N, positive while the jaws press, (n, n_times).
     """
     force = linear_jaw_force(gripper, network, course, time_s, inertia=inertia)
     if nonlinear:

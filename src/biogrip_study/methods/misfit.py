@@ -170,8 +170,20 @@ def two_modes(arm: Arm, lever_m: float, network: Network) -> tuple[Array, Array,
 
     A sample with one Maxwell branch has two modes without inertia. This special case of
     `biogrip.physics.response` is written out for speed: populations are small, and most time goes
-    into calls. Returns the final rotation in rad per N m, (n,), the exponents in 1/s and their
-    weights in rad per N m, (2, n).
+    into calls.
+
+    Parameters
+    ----------
+    arm, lever_m
+        Either arm, and its lever on the sample.
+    network
+        Of n samples.
+
+    Returns
+    -------
+    tuple of Array
+        Final rotation in rad per N m, (n,); exponents in 1/s and their weights in rad per N m,
+        (2, n).
     """
     squared_lever = lever_m**2
     rate = network.k[:, 0] / network.c[:, 0]

@@ -87,7 +87,15 @@ def measure(case: Case, seeds: Iterable[int], target: Path, measurements: Path) 
 
 
 def calibrate_gripper(case: Case, gripper: Path, records: Path) -> None:
-    """Simulate both arms' free motion with noise, and identify their properties."""
+    """Simulate both arms' free motion with noise, and identify their properties.
+
+    Parameters
+    ----------
+    case
+        Whose true gripper is tested as its block `calibration` says.
+    gripper, records
+        Written: the calibrated gripper, YAML, and what was measured, npz.
+    """
     test = case.block.calibration
     time_s = sample_times(test.duration_s, test.rate_Hz)
     noise = Noise("gaussian", test.noise_level, "peak")
