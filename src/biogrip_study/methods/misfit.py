@@ -24,16 +24,9 @@ from biogrip.physics.residuals import Residuals
 from biogrip.physics.roots import zeros_of_one_branch
 from biogrip.physics.sample_model import Network, SampleModel
 
-Misfit = Callable[[Array], Array]
-"""Function from parameters, (n, n_parameters), to RMS misfits in the unit of the readings, (n,)."""
-
 Misfits = Callable[[Array, IntArray], Array]
-"""The same from (n_populations, n, n_parameters) and trace indices to (n_populations, n)."""
-
-
-def make_misfit(residuals: Residuals) -> Misfit:
-    """Return the RMS misfit to the trace of residuals."""
-    return _series_of([residuals]) or residuals.misfit
+"""Function from parameters of populations, (n_populations, n, n_parameters), and the index of the
+trace of each, (n_populations,), to RMS misfits in the unit of the readings, (n_populations, n)."""
 
 
 def make_misfits(residuals: Sequence[Residuals]) -> Misfits:
@@ -44,18 +37,17 @@ def make_misfits(residuals: Sequence[Residuals]) -> Misfits:
     sampled uniformly from the start on, with a reading at each step, in white noise alone.
     """
     alike = len({of_trace.of_responses for of_trace in residuals}) == 1
-    if alike and (series := _series_of(residuals)):
+    if alike and (series := series_of(residuals)):
         return series.of_each
-    misfits = [make_misfit(of_trace) for of_trace in residuals]
 
     def one_by_one(parameters: Array, traces: IntArray) -> Array:
         pairs = zip(parameters, traces, strict=True)
-        return np.stack([misfits[trace](population) for population, trace in pairs])
+        return np.stack([residuals[trace].misfit(population) for population, trace in pairs])
 
     return one_by_one
 
 
-def _series_of(every: Sequence[Residuals]) -> "SeriesMisfit | None":
+def series_of(every: Sequence[Residuals]) -> "SeriesMisfit | None":
     """Return the misfit to traces of residuals that share responses, if these are series."""
     residuals = every[0]
     course, trace = residuals.course, residuals.trace
