@@ -28,7 +28,7 @@ from biogrip.physics.protocol import (
 )
 from biogrip.physics.response import phi_functions, step_response, superpose
 from biogrip.physics.roots import SMALLEST_GAP, separate
-from biogrip_study.gripper.simulation import jaw_force
+from biogrip_study.gripper.nonlinear import jaw_force
 from biogrip_study.methods.misfit import SeriesMisfit, series_of
 from tests.helpers.responses import exact_50_digits, random_samples
 from tests.physics.test_contact import TABLE_2

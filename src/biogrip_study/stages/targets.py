@@ -21,8 +21,7 @@ from biogrip.terminal import warn
 from biogrip.traces.columns import place
 from biogrip_study.config.study import Case
 from biogrip_study.gripper.calibration import calibrate, calibration_yaml, free_motion
-from biogrip_study.gripper.nonlinear import nonlinear_rotation
-from biogrip_study.gripper.simulation import jaw_force, target_grip
+from biogrip_study.gripper.nonlinear import jaw_force, nonlinear_rotation, target_grip
 from biogrip_study.gripper.unilateral import unilateral_response
 from biogrip_study.records.traces import (
     Measurements,
