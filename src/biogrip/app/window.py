@@ -109,8 +109,9 @@ class Window:
             self.look()
             self.command = join(["biogrip", *self.typed]) + " --report page.html --csv table.csv"
             self.traces = self._traces()
-            check_settings(self.traces[:_CHECKED])
-            self.recording, _ = read_trace(self.traces[0])
+            there = [own for own in self.traces if own.trace.is_file()]
+            check_settings(there[:_CHECKED])
+            self.recording = read_trace(there[0])[0] if there else None
         except BiogripError as error:
             self.problem = self.shown(error)
 
