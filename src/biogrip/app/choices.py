@@ -45,8 +45,8 @@ def likely_choices(numbers: Mapping[str, Array]) -> dict[str, str]:
         likely = (own for own, pattern in KNOWN["words"].items() if re.search(pattern, words))
         columns.setdefault(next(likely, "other"), name)
     read = [it for name, it in INSTRUMENTS.items() if name in columns]
-    likely_one = max(read, key=lambda it: it.sweeps + it.relative, default=INSTRUMENTS["strain"])
-    reading, load = likely_one.read.name, likely_one.controlled.name * (not likely_one.relative)
+    instrument = max(read, key=lambda it: it.sweeps + it.relative, default=INSTRUMENTS["strain"])
+    reading, load = instrument.read.name, instrument.controlled.name * (not instrument.relative)
     if {load, reading} <= {*columns}:
         load, reading = sorted((load, reading), key=lambda name: _steps(numbers[columns[name]]))
     partner = next((name for name in PARTNERS if name in columns), "")

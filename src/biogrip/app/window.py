@@ -154,14 +154,14 @@ class Window:
         command = [sys.executable, "-m", "biogrip", *self.typed, *outputs[: 3 - self.of_table]]
         with (self.out / "stdout").open("wb") as stdout, (self.out / "stderr").open("wb") as stderr:
             self.work = subprocess.Popen(command, cwd=self.folder, stdout=stdout, stderr=stderr)
-        limit = Timer(LONGEST_S, self.work.send_signal, [signal.SIGINT])
+        limit = Timer(LONGEST_S, self.work.send_signal, [signal.SIGTERM])
         limit.daemon = True
         limit.start()
 
     def stop(self) -> None:
-        """Stop the command as its user would in a terminal, and wait for its end."""
+        """Stop the command, which leaves no file half-written, and wait for its end."""
         if self.work and self.running_s:
-            self.work.send_signal(signal.SIGINT)
+            self.work.send_signal(signal.SIGTERM)
             self.work.wait()
 
     def said(self, stream: str) -> str:
