@@ -424,6 +424,30 @@ def test_columns_are_chosen_by_their_names(file: str, typed: str) -> None:
     assert options_typed(chosen) == shlex.split(typed)
 
 
+@pytest.mark.parametrize(
+    ("text", "names", "blocks", "last"),
+    [
+        ("Zeit;Weg\ns;mm\n0,5;1,25\n1;1,5\n1,5;2\n", ["Zeit", "Weg"], 1, [1.5, 2.0]),
+        ("1 2\n2 3\n3 5\n", ["1", "2"], 1, [3.0, 5.0]),
+        ("# t (s) F (nN)\n1 2\n2 3\n3 5\n", ["t (s)", "F (nN)"], 1, [3.0, 5.0]),
+        ("a,b\n1,2\n2,3\n\na,b\n1,7\n2,8\n3,9\n", ["a", "b"], 2, [3.0, 9.0]),
+        ("t,x\n10:00:01,1\n10:00:02,NA\n10:00:03,4\n", ["t", "x"], 1, [36003.0, 4.0]),
+    ],
+)
+def test_a_file_is_shown_before_its_columns_are_said(
+    tmp_path: Path, text: str, names: list[str], blocks: int, last: list[float]
+) -> None:
+    (tmp_path / "a.txt").write_text(text)
+    window = Window(tmp_path, names=["a.txt"])
+    window.look()
+    assert window.table
+    assert window.sheet
+    numbers = numbers_in(window.sheet, window.table)
+    assert [*numbers] == [*window.points] == names
+    assert [column[-1] for column in numbers.values()] == last
+    assert len(window.tables) == blocks
+
+
 def test_every_model_is_drawn_with_its_elements() -> None:
     drawings = KNOWN["drawings"]
     assert {*MODELS} <= {*drawings} <= {*CANDIDATES}
