@@ -142,7 +142,7 @@ def by_pymoo(task: Task, seed: int) -> float:
 class _Minimised(Problem):  # type: ignore[misc]
     def __init__(self, task: Task) -> None:
         genome = task.genome
-        super().__init__(n_var=genome.genes, n_obj=1, xl=genome.low, xu=genome.high, vtype=int)
+        super().__init__(n_var=len(genome.low), n_obj=1, xl=genome.low, xu=genome.high, vtype=int)
         self._task = task
 
     def _evaluate(self, x: IntArray, out: dict[str, Array], *args: Any, **kwargs: Any) -> None:
@@ -175,5 +175,5 @@ class _OneGene(Mutation):  # type: ignore[misc]
 def _mutate(chromosomes: IntArray, genome: Genome, rng: np.random.Generator, share: float) -> None:
     """Redraw one gene in a share of the chromosomes in place."""
     chosen = np.flatnonzero(rng.random(len(chromosomes)) < share)
-    gene = rng.integers(genome.genes, size=len(chosen))
+    gene = rng.integers(len(genome.low), size=len(chosen))
     chromosomes[chosen, gene] = rng.integers(genome.low[gene], genome.high[gene], endpoint=True)

@@ -20,7 +20,7 @@ from biogrip.physics.response import step_response, superpose
 from biogrip.physics.sample_model import SampleModel
 from biogrip_study.config.study import Case, load_study
 from biogrip_study.methods.genetic import GeneticSettings
-from biogrip_study.methods.genome import Genome, make_genome
+from biogrip_study.methods.genome import Genome
 from biogrip_study.methods.misfit import Misfit, make_misfit
 
 CONFIG = Path(__file__).parents[1] / "config" / "config.yaml"
@@ -93,6 +93,6 @@ def noisy_trace(seed: int = 0) -> NoisyTrace:
         time_s,
         trace_rad,
         rms(trace_rad - clean),
-        make_genome([case().experiment.ranges[p.range_name] for p in model.parameters]),
+        Genome(tuple(case().experiment.ranges[p.range_name] for p in model.parameters)),
         genetic,
     )

@@ -3,12 +3,16 @@
 import ast
 import json
 import re
+import shlex
+import shutil
 import textwrap
 from collections import Counter
 from collections.abc import Callable, Iterable
 from contextlib import redirect_stderr, redirect_stdout, suppress
+from difflib import get_close_matches
 from functools import cache
 from io import StringIO
+from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -19,20 +23,27 @@ import pandas as pd
 import yaml
 from scipy.stats import chi2
 
+from biogrip.arrays import Array
 from biogrip.cli import main
+from biogrip.command.words import in_sentences
+from biogrip.design import NO_BOUND, relative_bounds
 from biogrip.digits import plain as in_digits
 from biogrip.digits import with_unit
+from biogrip.fit.least_squares import identify_many
 from biogrip.fit.problem import silent
-from biogrip.physics.models import ALIASES, MAXWELL_MODELS
-from biogrip.physics.noise import add_noise, stream
+from biogrip.physics.drawing import sketched
+from biogrip.physics.models import ALIASES, MODELS
+from biogrip.physics.modes import linear_responses
+from biogrip.physics.noise import add_noise, standard_deviation, stream
 from biogrip.physics.simulation import simulated_response
 from biogrip.records import read_table
-from biogrip_study.methods.registry import identifier
+from biogrip_study.config.study import Case
 from biogrip_study.page import answers
 from biogrip_study.records.identifications import share_in_words
 from tests.helpers.default import STUDY, study_of
 from tests.helpers.key_reference import file_schema, reference
-from tests.helpers.places import EXAMPLE, EXAMPLE_TRUTH, ROOT
+from tests.helpers.places import EXAMPLE, ROOT
+from tests.helpers.runs import ran
 from tests.published_numbers import renewed_numbers
 from workflow.paper.claims import Results, add_columns, judge_all
 
@@ -56,14 +67,16 @@ def _path(name: str, overlay: str = "") -> Path:
 def sample_models() -> str:
     return _table(
         {"model": f"`{model.name}`", "is": model.title}
-        | {"parameters": ", ".join(parameter.name for parameter in model.parameters)}
+        | {"elements": f"`{sketched(model)}`"}
         | {"usual names": ", ".join(name for name, of in ALIASES.items() if of == model.name)}
-        for model in MAXWELL_MODELS
+        for model in MODELS.values()
     )
 
 
 # N s/m
 _SLOW = 1000
+PIPETTE_TRUTH = {"k_s": 500.0, "k_v": 400.0, "c_v": 2000.0, "tau_v": 5.0}
+"""Parameters that data/pipette.csv is simulated with."""
 
 
 def paper_against_study() -> str:
@@ -180,6 +193,30 @@ def protocols_compared() -> str:
     )
 
 
+def protocols_together() -> str:
+    """What two protocols of one gripper tell of one drop together: information adds."""
+    repaired = study_of((ROOT / "config" / "repaired.yaml").read_text(encoding="utf-8"))
+
+    def told(case: Case) -> Array:
+        experiment = case.experiment
+        values = np.array([case.parameters[name] for name in experiment.searched.names])
+        given = experiment.gripper, experiment.searched, experiment.torque, case.times_s
+        read, *slopes = linear_responses(*given, values[None])[0]
+        return np.array(slopes) / standard_deviation(read, case.noise)
+
+    rows, chosen = [], {"the paper's": (0,), "the other": (1,), "both": (0, 1)}
+    chosen |= {"the paper's, twice": (0, 0), "both, the other ten times": (0, *(1,) * 10)}
+    for drop in ("liquid_drop_1", "liquid_drop_2"):
+        case = STUDY.cases[drop]
+        of = [told(case), told(repaired.cases[f"{drop}_alternated"])]
+        for protocols, which in chosen.items():
+            bounds = relative_bounds(np.hstack([of[index] for index in which]), 1.0)
+            named = zip(case.experiment.searched.names, bounds.tolist(), strict=True)
+            said = {name: f"{100 * it:.2g} %" if it < NO_BOUND else "none" for name, it in named}
+            rows.append({"sample": case.title, "protocols": protocols, **said})
+    return _table(rows)
+
+
 def _claims() -> list[dict[str, str]]:
     """Return the claims in their order, each by the study of the most runs that can judge it."""
     tables = {"robustness_noise": pd.read_csv(_path("robustness_noise", "robustness"))}
@@ -277,9 +314,9 @@ def slow_branch() -> str:
     (target,) = simulated_response(case.gripper, case.network, case.torque, time_s)
     rngs = [stream(STUDY.config.study_seed, case.name, seed, "noise") for seed in seeds]
     traces = [add_noise(target, case.noise, rng, time_s) for rng in rngs]
-    identify = identifier("least_squares", case.block.least_squares)
     posed = (each.experiment.to_identify().of_each(time_s, traces) for each in (case, slow))
-    free, held = (np.array([it.misfit for it in identify(each, rngs, silent)]) for each in posed)
+    fits_of = [identify_many(each, case.block.least_squares, rngs, silent) for each in posed]
+    free, held = (np.array([fit.misfit for fit in fits]) for fits in fits_of)
     limit = chi2.ppf(case.confidence, 1)
     fits = int(np.sum(len(time_s) * ((held / free) ** 2 - 1) < limit))
     return (
@@ -299,11 +336,11 @@ def _range(values: "pd.Series[float]", how: str, unit: str = "") -> str:
 
 
 @cache
-def example(*options: str) -> tuple[str, dict[str, Any]]:
-    """What `biogrip identify` prints of the example, under options of the command, and its JSON."""
+def example(*options: str, trace: Path = EXAMPLE) -> tuple[str, dict[str, Any]]:
+    """What `biogrip identify` prints of a trace, under options of the command, and its JSON."""
     unheard = redirect_stderr(StringIO())
     with TemporaryDirectory() as folder, redirect_stdout(StringIO()) as said, unheard:
-        main(["identify", str(EXAMPLE), "--output", f"{folder}/found.json", *options])
+        main(["identify", str(trace), "--output", f"{folder}/found.json", *options])
         return said.getvalue(), json.loads(Path(folder, "found.json").read_text(encoding="utf-8"))
 
 
@@ -312,24 +349,54 @@ def printed_example(*options: str) -> str:
     return "\n".join(textwrap.indent(textwrap.fill(line, 136), "    ") for line in lines)
 
 
+def beginning_of_example() -> str:
+    with EXAMPLE.open(encoding="utf-8") as lines:
+        return f"```csv\n{''.join(islice(lines, 4))}```"
+
+
+def typed_in_readme() -> list[tuple[str, dict[str, Any]]]:
+    """What the commands of README print that identify one trace."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    typed = [
+        shlex.split(line) for line in re.findall(r"^    biogrip identify (\S+csv .*)$", text, re.M)
+    ]
+    left_out = "--plot", "fit.png", "--report", "page.html"
+    return [
+        example(*(it for it in options if it not in left_out), trace=ROOT / file)
+        for file, *options in typed
+    ]
+
+
 def identified_example() -> str:
-    """What it prints of the quantities, beside the truth, since the example is simulated."""
-    truth = yaml.safe_load(EXAMPLE_TRUTH.read_text())["cases"]["example"]["sample"]
-    del truth["model"]
-    made = ", ".join(f"{name} = {in_digits(value)}" for name, value in truth.items())
-    missed = ""
-    for q in example()[1]["quantities"]:
-        low, high = q["low"] or 0.0, q["high"] or np.inf
-        if not low <= (true := truth.get(q["quantity"], low)) <= high:
-            side, limit = ("upper", high) if true > high else ("lower", low)
-            missed += f", but for {q['quantity']}, whose {side} limit is {in_digits(limit, 4)}"
-    told = _quantities().partition("    Any linear sample")[0].rstrip()
-    return f"{told}\n\nTrue are {made}. The limits hold these{missed}."
+    """What is printed of the first trace's quantities, beside the truth: it is simulated."""
+    said, found = typed_in_readme()[0]
+    lines = [line for line in _said(said) if line.startswith(("data", "  "))]
+    told = "\n".join(f"    {line}" for line in lines[: 1 + len(found["quantities"])])
+    made = ", ".join(f"{name} = {in_digits(value)}" for name, value in PIPETTE_TRUTH.items())
+    missed = [
+        q["quantity"]
+        for q in found["quantities"]
+        if not q["low"] <= PIPETTE_TRUTH[q["quantity"]] <= q["high"]
+    ]
+    every = f"Every interval but of {missed}" if missed else "Every interval"
+    return f"{told}\n\nThe true values are {made}. {every} holds its true value."
+
+
+def doubted_example() -> str:
+    """Status of the second trace, and the first sentence of why."""
+    said, found = typed_in_readme()[1]
+    first, *_ = _said(said)
+    told = first, f"  {in_sentences(found['reasons'][0])[0]}"
+    return "\n".join(textwrap.indent(textwrap.fill(line, 112), "    ") for line in told)
+
+
+def _said(text: str) -> list[str]:
+    return text.replace(f"{ROOT}/", "").splitlines()
 
 
 def _quantities(*options: str) -> str:
     lines = [line.removeprefix("    ") for line in printed_example(*options).splitlines()]
-    told = (line for line in lines if line.startswith(("  ", "Any linear sample")))
+    told = (line for line in lines if line.startswith(("  ", "Model-free")))
     return "\n".join(f"    {line.removeprefix('  ')}" for line in told)
 
 
@@ -370,9 +437,17 @@ _COVERAGE = _path("coverage", "coverage")
 _SHORTER = "--no-compare", "--set", "gripper.arm_length_m=1.2e-3"
 PARTS: dict[str, dict[str, Callable[[], str]]] = {
     "docs/reference/config.md": {"keys": reference},
-    "README.md": {"answer": answer, "example": identified_example},
+    "README.md": {
+        "answer": answer,
+        "example": identified_example,
+        "doubtful": doubted_example,
+    },
     "CONTRIBUTING.md": {"folders": folders},
-    "docs/tutorial.md": {"printed": printed_example, "shorter": lambda: _quantities(*_SHORTER)},
+    "docs/tutorial.md": {
+        "file": beginning_of_example,
+        "printed": printed_example,
+        "shorter": lambda: _quantities(*_SHORTER),
+    },
     "docs/reference/command.md": {"help": command_help},
     "docs/models.md": {"models": sample_models},
     "docs/identifiability.md": {"slow": slow_branch, "methods": methods_compared},
@@ -384,8 +459,9 @@ PARTS: dict[str, dict[str, Callable[[], str]]] = {
         "readings": readings_compared,
         "choices": choices,
         "joint": joint,
-        "told": lambda: answers.say_what_traces_tell(read_table(_COVERAGE), _CASES),
+        "told": lambda: _table(answers.rows_of_determined(read_table(_COVERAGE), _CASES)),
         "protocols": protocols_compared,
+        "together": protocols_together,
     },
 }
 """Parts of documents that are written, by what."""
@@ -410,7 +486,21 @@ def renewed(path: Path) -> str:
         if match is None:
             raise ValueError(f"{path}: has no part {name} to be written.")
         text = f"{text[: match.start(1)]}\n{content()}\n\n{text[match.end(1) :]}"
-    return renewed_numbers(text)
+    return renewed_numbers(SHOWN.sub(_printed_again, text))
+
+
+SHOWN = re.compile(r"^```sh\n(biogrip identify data/[^`]*)```[^`]*^```text\n(.*?)^```", re.S | re.M)
+"""Commands, and lines of what they print."""
+
+
+def _printed_again(shown: re.Match[str]) -> str:
+    """Type commands, and put in the place of each line the one printed that is most like it."""
+    with TemporaryDirectory() as folder:
+        shutil.copytree(ROOT / "data", Path(folder, "data"))
+        typed = [shlex.split(line, comments=True) for line in shown[1].splitlines()]
+        said = "".join(ran(Path(folder), *each, PYTHONPATH=str(ROOT / "src")) for each in typed)
+    lines = [get_close_matches(it, said.splitlines(), 1, 0.0)[0] for it in shown[2].splitlines()]
+    return shown[0].replace(shown[2], "".join(f"{line}\n" for line in lines))
 
 
 if __name__ == "__main__":

@@ -112,7 +112,9 @@ def test_parameters_that_are_told_to_less_than_an_e_fold_or_trade_have_no_bound(
 @pytest.mark.parametrize(
     ("text", "held"),
     [
-        (GRIPPER.replace(", liquid_drop_2", ""), "torque_Nm"),
+        pytest.param(
+            GRIPPER.replace(", liquid_drop_2", ""), "torque_Nm", marks=pytest.mark.nightly
+        ),
         (STRESS, "stress_Pa"),
         (CREEP.replace("HELD", "strain").replace("creep", "relaxation"), "strain"),
     ],

@@ -1,7 +1,9 @@
 import re
 from pathlib import Path
 
+import jsonschema
 import pytest
+import yaml
 
 from tests.generated_docs import DOCUMENTS, GENERATED, renewed
 from tests.helpers.default import study_of
@@ -58,3 +60,51 @@ def test_links_lead_somewhere(path: Path) -> None:
     links = re.findall(r"\]\(([^)#]*)(?:#[^)]*)?\)", text)
     own = [link for link in links if link and "://" not in link]
     assert [link for link in own if not (path.parent / link).is_file()] == []
+
+
+def test_hosted_runs_type_what_the_readme_types_without_make() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    typed = re.findall(r"^    ((?:python|biogrip) .*)$", text, re.M)
+    ci = yaml.safe_load((ROOT / ".github" / "workflows" / "ci.yml").read_text(encoding="utf-8"))
+    assert len(typed) > 4
+    assert typed == [step["run"] for step in ci["jobs"]["install"]["steps"] if "run" in step]
+
+
+# What the catalogue's page "Adding workflows" allows.
+FLAGS = {"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]}
+CATALOGUE = {
+    "type": "object",
+    "required": ["usage"],
+    "additionalProperties": False,
+    "properties": {
+        "usage": {
+            "type": "object",
+            "required": ["software-stack-deployment", "report"],
+            "additionalProperties": False,
+            "properties": {
+                "mandatory-flags": {
+                    "type": "object",
+                    "required": ["desc", "flags"],
+                    "additionalProperties": False,
+                    "properties": {"desc": {"type": "string", "minLength": 1}, "flags": FLAGS},
+                },
+                "software-stack-deployment": {
+                    "type": "object",
+                    "required": ["conda", "apptainer", "apptainer+conda"],
+                    "additionalProperties": {"type": "boolean"},
+                },
+                "report": {"type": "boolean"},
+            },
+        }
+    },
+}
+
+
+def test_the_workflow_catalogue_finds_what_it_asks_for() -> None:
+    said = (ROOT / ".snakemake-workflow-catalog.yml").read_text(encoding="utf-8")
+    jsonschema.validate(yaml.safe_load(said), CATALOGUE)
+    readme = (ROOT / "README.md").read_text(encoding="utf-8").lower()
+    assert all(word in readme for word in ("snakemake", "workflow"))
+    assert (ROOT / "workflow" / "Snakefile").is_file()
+    assert (ROOT / "config" / "README.md").is_file()
+    assert [*(ROOT / "workflow" / "rules").glob("*.smk")]

@@ -100,6 +100,7 @@ def test_pseudo_values_are_means_of_units_where_no_cell_is_bounded() -> None:
     assert 1 < nearer["a"] < 1.2
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("cells", "error"), [(5, 0.03), (6, 0.1), (12, 0.1), (12, 0.3)])
 def test_limits_hold_the_truth_and_equal_dishes_seldom_differ(cells: int, error: float) -> None:
     """In 500 pairs 95 % are known to within 3 % (three errors), in 1000 groups to within 2 %."""
@@ -335,6 +336,13 @@ FEW = "p takes 3 units"
         ("12", "3456789", FEW),
         ("123", "456", "Welch of 3 and 3"),
         ("123", "456789", "Welch of 3 and 6"),
+        ("123", "456789X", FEW),
+        ("1234", "56789XYZUV", "Welch of 4 and 10"),
+        ("1", "12", FEW),
+        ("123", "345", FEW),
+        ("123", "234", "2 pairs"),
+        ("1234567", "7654321", "7 pairs"),
+        ("12", "123456789", "2 pairs"),
         ("1", "1", FEW),
         ("12", "12", "2 pairs"),
         ("123", "123", "3 pairs"),
@@ -392,7 +400,7 @@ def test_of_two_units_in_a_group_there_is_no_p() -> None:
     cells = Design(units=(2, 10)).table(np.random.default_rng(1))
     row = compare(cells, ["a", "b"], 0.95, units=True)["k", "b"]
     assert "p" not in row
-    assert "3 units in each group, or 2 that are in both" in row["no_p"]
+    assert "3 units in each group, 4 beside more than 6, or 2 that are in both" in row["no_p"]
     assert "ratio" in row
     assert "ratio_low" not in row
     first = compare(cells, ["a", "b"], 0.95, units=True)["k", "a"]
@@ -429,6 +437,7 @@ def test_equal_cells_of_dishes_often_differ() -> None:
         assert f"| 3 | {100 * scatter:g} % | " + " | ".join(f"{it:.0f} %" for it in shares) in said
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("scatter", "ratio", "dishes"), [(0.2, 1.5, 6), (0.2, 1.3, 12)])
 def test_enough_dishes_tell_a_ratio(scatter: float, ratio: float, dishes: int) -> None:
     """By the rule of docs/groups.md in eight of ten; three standard deviations of 400 are 6 %."""
@@ -533,7 +542,8 @@ def test_of_one_unit_a_group_nothing_is_told_but_means(said: Said) -> None:
     ratio = median / np.exp(means_of(rows)["left"].mean())
     assert lines[4].split()[-3:] == [f"{median:.3g}", f"{ratio:.3g}", "none"]
     assert lines[5] == (
-        "No p for k of right: p takes 3 units in each group, or 2 that are in both."
+        "No p for k of right: p takes 3 units in each group, 4 beside more than 6, or 2 that are "
+        "in both."
     )
     paper = said(rows, "--unit", "day", part=1)
     assert "Ratios" not in paper

@@ -1,20 +1,27 @@
+import ast
+import json
 import re
+from base64 import b64decode
+from io import BytesIO
 from math import gamma
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+import PIL.Image
 import pytest
 import yaml
+from matplotlib.figure import Figure
 
 import biogrip
 from biogrip import library
 from biogrip.command.options import Setting
 from biogrip.command.settings import Asked, case_of
 from tests.helpers.default import STUDY
-from tests.helpers.identified import identified, told
+from tests.helpers.identified import by_quantity, identified, told
 from tests.helpers.places import EXAMPLE, ROOT
+from tests.helpers.problems import problem
 
 DOCUMENT = ROOT / "docs" / "library.md"
 
@@ -171,7 +178,7 @@ def test_a_few_readings_that_relax_are_a_response(count: int) -> None:
     assert np.all((limits["low"] < [100, 20]) & (limits["high"] > [100, 20]))
 
 
-@pytest.mark.parametrize("unit_s", [1e-7, 86_400.0])
+@pytest.mark.parametrize("unit_s", [1e-7, pytest.param(86_400.0, marks=pytest.mark.nightly)])
 def test_a_power_law_has_no_time_of_its_own(unit_s: float) -> None:
     """t^alpha/(k Gamma(1 + alpha)) of 100 units of time, 700 Pa and 0.25 in that unit."""
     times = np.linspace(0.5, 100.0, 120)
@@ -192,3 +199,50 @@ def test_all_of_the_library_can_be_had_from_the_package_and_is_as_the_default_st
         _ = biogrip.nonsense
     budgets = [case.block.least_squares for case in STUDY.cases.values()]
     assert all(budget == CREEP.least_squares for budget in budgets)
+
+
+@pytest.mark.parametrize(
+    ("case", "outlasts"), [("endothelial_cell", False), ("liquid_drop_1", True)]
+)
+def test_a_sum_has_a_condition_where_a_branch_may_outlast_the_trace(
+    case: str, outlasts: bool
+) -> None:
+    posed = problem(case, 0).residuals.trace
+    found = by_quantity(told(posed.time_s, posed.readings).data)
+    high_s = found["tau"]["high"]
+    assert (high_s is None or high_s > 400.0) == outlasts
+    assert (found["c + c_p"]["provided"] is not None) == outlasts
+    assert ("provided" in found["c + c_p"]["in_words"]) == outlasts
+
+
+def test_a_notebook_shows_status_table_and_picture() -> None:
+    posed = problem("endothelial_cell", 0).residuals.trace
+    shown = told(posed.time_s, posed.readings)._repr_html_()
+    (picture,) = re.findall('<img src="data:image/png;base64,([^"]+)"', shown)
+    with PIL.Image.open(BytesIO(b64decode(picture))) as image:
+        assert image.width > 600
+    rows = re.findall("<th>([^<]+)</th>\n      <td>", shown)
+    assert rows == ["k", "k_p", "c", "c_p", "c + c_p", "tau"]
+    assert "model: fit ok</p>" in shown
+
+
+def test_the_notebook_says_what_it_shows(capsys: pytest.CaptureFixture[str]) -> None:
+    cells = json.loads((ROOT / "docs" / "notebook.ipynb").read_text(encoding="utf-8"))["cells"]
+    names: dict[str, Any] = {}
+    shown = 0
+    for cell in (it for it in cells if it["cell_type"] == "code"):
+        source = "".join(cell["source"])
+        last = ast.parse(source).body[-1]
+        exec(compile(source, "notebook", "exec"), names)
+        said = capsys.readouterr().out
+        for output in cell["outputs"]:
+            if output["output_type"] == "execute_result":
+                assert isinstance(last, ast.Expr)
+                value = eval(ast.unparse(last), names)
+                assert isinstance(value, Figure) or repr(value) == "".join(
+                    output["data"]["text/plain"]
+                )
+            else:
+                assert said == "".join(output["text"])
+            shown += 1
+    assert shown == 4

@@ -63,6 +63,7 @@ def test_what_is_to_be_written_twice_is_named(
     assert (status, "would be written for '--report' and for '--csv'" in said) == (1, True)
 
 
+@pytest.mark.nightly
 def test_a_file_of_any_name_has_its_row(
     tmp_path: Path, few: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -9,10 +9,12 @@ from contextlib import redirect_stderr
 from importlib import import_module
 from io import StringIO
 from pathlib import Path
+from time import process_time
 from typing import Any
 
 import numpy as np
 import pandas as pd
+import PIL.Image
 import pytest
 import yaml
 
@@ -32,7 +34,7 @@ from tests.helpers.problems import clean
 
 
 def test_the_example_gives_its_truth() -> None:
-    """What is printed of its quantities stands in README.md."""
+    """What is printed of it stands in the tutorial."""
     said, found = example()
     quantities = by_quantity(found)
     truth = yaml.safe_load(EXAMPLE_TRUTH.read_text())["cases"]["example"]["sample"]
@@ -85,7 +87,10 @@ def test_a_declared_offset_and_drift_are_fitted_along() -> None:
     assert found.data["drift_rad_per_s"] == pytest.approx(1e-6, abs=1e-6)
     assert "χ² falls" not in str(found)
     few, clear = times[::4], (response + 5e-4 + 1e-6 * times)[::4]
+    begun_s = process_time()
     exact = told(few, clear, offset=True, drift=True, model="liquid_drop").data
+    # A trace without noise is not fitted again and again, a little lower each time: 33 s.
+    assert process_time() - begun_s < 10
     assert exact["drift_rad_per_s"] == pytest.approx(1e-6, rel=1e-3)
     assert exact["offset_rad"] == pytest.approx(5e-4, rel=1e-3)
 
@@ -385,3 +390,22 @@ def test_noise_is_named_by_who_says_what_it_is() -> None:
     ):
         found = {"fit": fit, "noise_model": modelled, "assumed": {"measurement": given}}
         assert noise_in_words(found) == said
+
+
+def test_a_picture_of_one_trace_is_written(tmp_path: Path, few: Path) -> None:
+    trace, other = tmp_path / "a.csv", tmp_path / "b.csv"
+    for seed, path in enumerate((trace, other)):
+        write_drop(path, seed)
+    options = ("--config", few, "--no-compare", "--plot", tmp_path / "fit.png")
+    # Typed twice, it is replaced.
+    for _ in range(2):
+        status, said, complained = identify(trace, *options)
+        assert status == 0, complained
+        assert said.rstrip().endswith("fit.png.")
+    with PIL.Image.open(tmp_path / "fit.png") as image:
+        assert image.width > image.height > 600
+    for refused in ((trace, other, *options), (trace, *options[:-1], tmp_path / "fit.pdf")):
+        status, _, complained = identify(*refused)
+        assert status == 1
+        assert "allowed is a name that ends with .png, of one trace" in complained
+    assert not (tmp_path / "fit.pdf").exists()

@@ -1,7 +1,11 @@
 """Traces that start before their torque: given onsets, fitted ones, and what is said without."""
 
+import os
 import re
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,12 +13,13 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.judging.onset import OnsetFits, begins_constant, estimate_onset, is_cut_off
+from biogrip.judging.onset import OnsetFit, OnsetFits, begins_constant, estimate_onset, is_cut_off
 from biogrip.library import Sample, TraceResult, set_up, simulate
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.protocol import Phase, hold, ramp
 from tests.helpers.default import STUDY
 from tests.helpers.identified import told
+from tests.helpers.places import ROOT
 
 PHASES = (hold(20.0, 1e-9), hold(20.0, 0.4e-9), hold(20.0, 1.2e-9))
 TRUTH = {"k": 29.0, "k_p": 6.0, "c": 100.0, "c_p": 20.0}
@@ -83,6 +88,36 @@ def test_an_onset_is_fitted_on_any_clock(clock: str) -> None:
     fits = OnsetFits(creep, times, exact + noise)
     best, true = fits.best(float(times[0])), fits.at(0.0, np.log([*truth.values()]))
     assert best.misfit <= true.misfit * (1 + 1e-9)
+
+
+def test_no_interval_of_onsets_is_fitted_twice(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neighbours of neighbours are those that were tried."""
+    times, values = late(3)
+    fits, tried = OnsetFits(EXPERIMENT, times, values), []
+    within = OnsetFits._within
+
+    def counted(self: OnsetFits, start: OnsetFit, low_s: float, high_s: float) -> OnsetFit:
+        tried.append((low_s, high_s))
+        return within(self, start, low_s, high_s)
+
+    monkeypatch.setattr(OnsetFits, "_within", counted)
+    found = fits.near(fits.at(ONSET_S - 0.5, np.log([*TRUTH.values()])))
+    assert found.onset_s == pytest.approx(ONSET_S, abs=0.1)
+    assert len(tried) == len(set(tried)) < 10
+
+
+@pytest.mark.nightly
+def test_a_fitted_start_costs_at_most_three_times_a_known_one(tmp_path: Path) -> None:
+    """In processor time of the command in turn, the lowest of three each."""
+    command = [sys.executable, "-m", "biogrip", "identify", str(ROOT / "data/example_trace.csv")]
+    spent: dict[str, list[float]] = {"0": [], "fit": []}
+    for _ in range(3):
+        for start, times_s in spent.items():
+            given = [*command, "--start", start, "--output", str(tmp_path / "found.json")]
+            before = os.times().children_user
+            subprocess.run(given, check=True, capture_output=True)
+            times_s.append(os.times().children_user - before)
+    assert min(spent["fit"]) < 3 * min(spent["0"])
 
 
 def test_padding_before_the_onset_is_no_measurement() -> None:
@@ -178,6 +213,7 @@ def test_models_are_compared_each_at_its_own_onset() -> None:
 HOLD = np.arange(0.4, 44, 0.4)
 
 
+@pytest.mark.nightly
 def test_limits_of_any_sample_hold_whatever_the_fitted_start() -> None:
     """Creep after a jump looks the same from any start up to the first reading."""
     values = 5 - 3 * np.exp(-HOLD / 8)
@@ -241,6 +277,7 @@ def test_a_ramp_before_the_first_reading_is_said_to_change_values() -> None:
     assert "If the load was no step" not in notes_on(times, values, config=protocol, **given)[1]
 
 
+@pytest.mark.nightly
 def test_a_start_between_0_and_the_first_reading_is_found() -> None:
     """Of a power law, which no other start fits; it is good to half a per cent with one at 0."""
     times: Array = 1.0 + 0.02 * np.arange(1000.0)

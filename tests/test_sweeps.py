@@ -119,6 +119,7 @@ def test_a_published_fit_has_its_misfit_and_lies_within_limits_about_a_lower_one
         assert found[name]["low"] < value < found[name]["high"]
 
 
+@pytest.mark.nightly
 def test_the_fit_that_rheos_publishes_has_its_misfit_and_lies_within_the_limits() -> None:
     """That is of logarithms, ours of relative deviations."""
     sweep, published = measured("rheos"), (0.00921903, 0.770062, 0.913296, 0.100392)

@@ -195,6 +195,7 @@ def test_a_trace_that_fails_is_a_row_that_says_why(here: Path) -> None:
         assert "<td>lost</td>" in (here / "page.html").read_text()
 
 
+@pytest.mark.nightly
 def test_a_killed_process_costs_a_batch_its_trace_alone(
     here: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -323,3 +324,11 @@ def test_what_looks_like_a_setting_is_not_copied_beside_the_result(tmp_path: Pat
             said = f"looks like a setting and is none; allowed is '{meant}' for a column that sets "
             said += "it, in SI units, or a name unlike a setting's."
             assert refused(path) == [f"{path}, line 1, column '{name}': {said}"]
+
+
+def test_jobs_are_done_one_after_another_where_nothing_forks(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As on Windows."""
+    monkeypatch.setattr(command, "get_all_start_methods", lambda: ["spawn"])
+    assert [*command.side_by_side(abs, [-1, 2, -3], 2)] == [1, 2, 3]

@@ -52,6 +52,7 @@ def test_what_was_typed_is_shown(capsys: pytest.CaptureFixture[str]) -> None:
     assert not OBEYED.search(error)
 
 
+@pytest.mark.nightly
 def test_names_of_traces_are_shown_wherever_they_are_said(tmp_path: Path, few: Path) -> None:
     page = tmp_path / "page.html"
     good, bad, absent = (tmp_path / f"{name}{HOSTILE}\n.csv" for name in ("good", "bad", "absent"))
@@ -78,13 +79,19 @@ def test_progress_is_shown_and_that_of_a_command_is_no_output(
 ) -> None:
     """A job's is: its log has what goes to standard error."""
     monkeypatch.setattr(terminal, "_PROGRESS_INTERVAL_S", 0.0)
-    with terminal.Progress(HOSTILE, 1, live=alone) as told:
-        told.done()
+    clock = iter([100.0, 130.0, 140.0])
+    monkeypatch.setattr("time.monotonic", lambda: next(clock, 140.0))
+    with terminal.Progress(HOSTILE, 2, live=alone) as told:
+        told.within(0.5)
+        told.done(2)
     shown = capsys.readouterr()
     seen, empty = (shown.err, shown.out) if alone else (shown.out, shown.err)
-    assert (seen, empty) == (f"{visible(HOSTILE)}: 1 of 1 done\n", "")
-    with terminal.Progress("a", 1) as told:
+    lines = [f"{visible(HOSTILE)}: {said}" for said in ("25 % done, 90 s left", "100 % done")]
+    assert (seen.splitlines(), empty) == (lines, "")
+    with terminal.Progress("a", 5) as told:
         told.doing(f"cell {HOSTILE}")
+        assert capsys.readouterr().out.startswith("a: step 2 of 5, cell ")
+        told.doing(HOSTILE)
     terminal.warn(f"{HOSTILE}: a note")
     for text in capsys.readouterr():
         assert visible(HOSTILE) in text or not text
@@ -106,6 +113,7 @@ def test_examples_are_commands_that_can_be_typed(
         _parser().parse_args(arguments)
 
 
+@pytest.mark.nightly
 def test_a_command_needs_no_standard_streams(tmp_path: Path) -> None:
     """As of a service, which closes them: no file gets what is printed."""
     write_drop(tmp_path / "trace.csv", 0)

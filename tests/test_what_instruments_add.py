@@ -87,6 +87,7 @@ def test_a_rise_goes_with_a_hold(tmp_path: Path) -> None:
     assert "--ramp: found 200 s, allowed is less than the trace's 100 s" in complained
 
 
+@pytest.mark.nightly
 def test_deviations_that_are_a_share_of_each_reading_are_of_the_smooth_course(
     tmp_path: Path,
 ) -> None:

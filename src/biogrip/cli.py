@@ -86,6 +86,7 @@ class _Parser(argparse.ArgumentParser):
 
 def _model_lines() -> list[str]:
     """Return the names and titles of the sample models, usual ones first."""
+    from biogrip.physics.drawing import sketched
     from biogrip.physics.models import ALIASES, MODELS
 
     width = max(map(len, MODELS))
@@ -96,6 +97,7 @@ def _model_lines() -> list[str]:
         others = [other for other in (*ALIASES, *MODELS) if ALIASES.get(other, other) == name]
         also = ", ".join(other for other in others if other != usual)
         lines.append(f"  {usual:<{width}}  {MODELS[name].title}" + (f" ({also})" if also else ""))
+        lines.append(f"  {'':<{width}}  {sketched(MODELS[name])}")
     return [*lines, f"  {'jeffreys':<{width}}  Burgers fluid without its spring"]
 
 
@@ -162,6 +164,8 @@ def _add_settings(parser: Any) -> None:
         help="CSV file with a header; or a table of traces: column file has their names, columns "
         "named like keys of the config set these, others are copied to --csv",
     )
+    text = "all traces are of one sample, which they tell together (a table: column sample)"
+    parser.add_argument("--together", action="store_true", help=text)
     for title, options in GROUPS.items():
         group = parser.add_argument_group(title)
         for name, metavar, key, text in options:
@@ -181,6 +185,7 @@ def _add_settings(parser: Any) -> None:
             group = parser.add_argument_group("output")
             _add_file(group, "--report", "PAGE", "HTML page with pictures")
             _add_file(group, "--csv", "TABLE", "CSV file, a row per trace", dest="table")
+            _add_file(group, "--plot", "FIGURE", "PNG file, of one trace: its fit")
             text = "JSON file, of one trace [TRACE.identified.json]"
             _add_file(group, "--output", "FILE", text)
 

@@ -269,9 +269,10 @@ def _printed(compared: Compared, grouped: _Grouped) -> str:
         for (name, group), row in compared.items()
         if name in named
     ]
-    of_units = [grouped.unit, f"scatter of cells, {grouped.unit}"] if grouped.unit else []
+    scatter = "SD of logarithms: cells, units"
+    of_units = [f"units ({grouped.unit})", scatter] if grouped.unit else []
     of_group = "geometric mean", f"ratio to {grouped.names[0]}", "p"
-    return aligned(rows, ("quantity", "group", "determined in", *of_units, *of_group))
+    return aligned(rows, ("quantity", "group", "cells determined", *of_units, *of_group))
 
 
 def _shown(row: Mapping[str, Any]) -> Iterator[str]:

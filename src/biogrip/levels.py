@@ -138,6 +138,9 @@ MISSED = 0.05
 """Increase of chi^2, from the weak prior of local fits, beyond which a fit is not the optimum: an
 eightieth of what moves a 95 % limit."""
 
+EXACT = 1e-7
+"""Misfit over the peak below which a fit is not lowered: no instrument reads 24 bits."""
+
 WIDE = 3.0
 """Limits further than this factor from their middle tell little more than an order of magnitude:
 moduli of cells of one kind scatter by a factor of about 2 to 3."""
@@ -169,6 +172,16 @@ OF_THE_FASTEST = 1e4
 
 WORTH_SAYING = 0.005
 """Share of the noise's variance that is said: half of the percent that it is rounded to."""
+
+# Several traces of one sample.
+
+ONE_SAMPLE = 0.01
+"""Level at which traces are not of one sample, for both tests together: it rejects a joint fit, of
+which one in a hundred right ones is lost; each trace's own result stays."""
+
+TELLS = 0.1
+"""Information on a combination of log-parameters, in squares of e-folds, from which on a fit adapts
+it, and it counts as a degree of freedom: standard deviations of three e-folds. Chosen."""
 
 # Other models, and instruments.
 

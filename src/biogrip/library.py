@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from threadpoolctl import threadpool_limits
 
 from biogrip.arrays import Array, as_column
-from biogrip.command.files import data_of
+from biogrip.command.files import data_of, sample_of
 from biogrip.command.options import Setting
 from biogrip.command.outputs import Outcome, table_of
 from biogrip.command.settings import MODEL, Asked, read_trace
@@ -117,7 +117,8 @@ class TraceResult:
 
     def refit(self, **changed: Any) -> "TraceResult":
         """Identify the trace again with some other arguments, as ``model="sls"``."""
-        return identify_trace(**{**self.arguments, **changed})
+        again = identify_together if "traces" in self.arguments else identify_trace
+        return again(**{**self.arguments, **changed})
 
     def plot(self, what: str = "fit") -> "Figure":
         """Draw the trace, its fit and the residuals, or instead the ``"profiles"``."""
@@ -134,6 +135,14 @@ class TraceResult:
         """Return status and verdicts, a line each."""
         lines = (f"  {item['quantity']}  {item['in_words']}" for item in self.data["quantities"])
         return "\n".join([f"{self.data['model_title']}: fit {self.status}", *lines])
+
+    def _repr_html_(self) -> str:
+        """Return status, table and picture, which Jupyter shows."""
+        from biogrip.command.page import address
+
+        table = self.to_frame().to_html(na_rep="", border=0)
+        said = f"<p>{self.data['model_title']}: fit {self.status}</p>"
+        return f'{said}{table}<img src="{address(self.plot())}" width="560">'
 
     def __str__(self) -> str:
         """Return what the command prints."""
@@ -246,6 +255,34 @@ def identify_trace(
         raise BiogripError(_with_arguments(str(error))) from None
     data = data_of(diagnosis, case, asked.name, asked.given)
     return TraceResult(diagnosis, _with_arguments(data), arguments)
+
+
+@one_blas_thread
+def identify_together(
+    traces: Mapping[str, Mapping[str, Any]] | Iterable[Mapping[str, Any]], **shared: Any
+) -> TraceResult:
+    """Identify one sample from several traces, and test whether they are of one sample.
+
+    Parameters
+    ----------
+    traces
+        Arguments of `identify_trace` of each, by name or numbered: creep, relaxation, sweeps and
+        grippers may be mixed where the stiffness has one unit.
+    shared
+        Arguments that all have, as ``model="sls"``.
+
+    Raises
+    ------
+    BiogripError
+        If a trace cannot be used, or they have not one model, unit of stiffness and confidence.
+    """
+    given = traces
+    if not isinstance(given, Mapping):
+        given = {f"trace {number}": arguments for number, arguments in enumerate(given, start=1)}
+    results = {name: identify_trace(**{**shared, **own}) for name, own in given.items()}
+    said = {name: (one.diagnosis, {**one.data, "trace": name}) for name, one in results.items()}
+    sample, data = sample_of("sample", said)
+    return TraceResult(sample, _with_arguments(data), {"traces": given, **shared})
 
 
 def to_table(
@@ -365,6 +402,7 @@ __all__ = [
     "add_noise",
     "hold",
     "identify_sample",
+    "identify_together",
     "identify_trace",
     "set_up",
     "simulate",

@@ -35,8 +35,9 @@ def end_when_stopped() -> None:
 def _end_with_signal(number: int, _: FrameType | None) -> None:
     """Exit with a message after the command's name; the status is 128 plus the signal's number."""
     # Ignore further signals.
-    for other in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(other, signal.SIG_IGN)
+    for other in ("SIGINT", "SIGTERM", "SIGHUP"):
+        if hasattr(signal, other):  # Windows has no SIGHUP.
+            signal.signal(getattr(signal, other), signal.SIG_IGN)
     _remove_unfinished()
     # A signal may arrive during a write to either stream.
     with suppress(OSError, RuntimeError, ValueError):

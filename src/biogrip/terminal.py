@@ -10,7 +10,7 @@ from itertools import zip_longest
 CLEARED = "\r\x1b[K"
 """What clears a line of a terminal."""
 
-_PROGRESS_INTERVAL_S = 5.0
+_PROGRESS_INTERVAL_S, _BAR = 5.0, 20
 # Control characters, marks that change the writing direction, line separators, and surrogates,
 # which stand for bytes in file names that are not valid text.
 _OBEYED = (
@@ -52,10 +52,10 @@ def open_closed_streams() -> None:
 
 
 class Progress(AbstractContextManager["Progress"]):
-    """Counter of the completed pieces of a job.
+    """What share of the pieces of a job is done, and how long the rest takes if it goes on so.
 
-    If it is live, it shows every phase on the terminal in a line that is cleared at the end: not
-    for jobs that share a terminal. If it is quiet, it prints notes only.
+    If it is live, it shows a bar on the terminal in a line that is cleared at the end: not for jobs
+    that share a terminal. If it is quiet, it prints notes only.
     """
 
     def __init__(self, what: str, total: int, *, live: bool = False, quiet: bool = False) -> None:
@@ -65,7 +65,7 @@ class Progress(AbstractContextManager["Progress"]):
         self._quiet = quiet
         self._done = 0
         self._phase = ""
-        self._said = time.monotonic()
+        self._said = self._began = time.monotonic()
 
     def __exit__(self, *_: object) -> None:
         """Clear the line on the terminal."""
@@ -75,28 +75,28 @@ class Progress(AbstractContextManager["Progress"]):
     def done(self, pieces: int = 1) -> None:
         """Count completed pieces, and print the progress."""
         self._done += pieces
-        self._phase = ""
-        self._say("")
+        self.within(0.0)
 
     def doing(self, phase: str) -> None:
-        """Set the name of the current phase."""
-        self._phase = f", {visible(phase)}"
-        self._say("")
+        """Count a completed piece, and name the phase that the next one is."""
+        self._done += 1
+        self._phase = f"step {self._done + 1} of {self._total}, {visible(phase)}"
+        self.within(0.0)
 
     def note(self, text: str) -> None:
         """Print lines for people."""
         cleared = CLEARED if self._live else ""
         print(f"{cleared}{visible_lines(text)}", file=sys.stderr, flush=True)
 
-    def within(self, evaluations: int, misfit: float) -> None:
-        """Print the progress of an identification within a piece."""
-        self._say(f", {evaluations} responses, misfit {misfit:.4g}")
-
-    def _say(self, more: str) -> None:
-        now = time.monotonic()
-        said = f"{self._what}: {self._done} of {self._total} done{self._phase}{more}"
+    def within(self, share: float) -> None:
+        """Print the progress when a share of the next piece is done, 0 to 1."""
+        now, part = time.monotonic(), (self._done + share) / self._total
+        # Pieces that are phases take unlike times.
+        left = f", {(now - self._began) * (1 / part - 1):.0f} s left" if 0 < part < 1 else ""
+        said = f"{self._what}: {self._phase or f'{100 * part:.0f} % done{left}'}"
         if self._live:
-            print(f"{CLEARED}{said}", end="", file=sys.stderr, flush=True)
+            bar = "#" * round(_BAR * part)
+            print(f"{CLEARED}[{bar:.<{_BAR}}] {said}", end="", file=sys.stderr, flush=True)
         elif now - self._said >= _PROGRESS_INTERVAL_S and not self._quiet:
             self._said = now
             # Of a job to standard output, so that it does not fill the log; there a command prints

@@ -54,7 +54,7 @@ def test_the_first_run_of_each_basin_is_drawn(tmp_path: Path, identifications: P
     measured = tmp_path / "seeds_0-2.npz"
     write_measurements(measured, Measurements(TIME_S, target, traces))
     with styled():
-        drawn = draw_fits(study_of(FEW).cases[CASE], identifications, [measured], [])
+        drawn = draw_fits(study_of(FEW).cases[CASE], identifications, [measured])
     for label, k in (("seed 1, near the noise", 0.7), ("seed 0, above the noise", 9.0)):
         expected = 1e3 * rotation(MODEL, [k, *TRUTH[1:]], TIME_S)
         (line,) = (it for it in drawn.axes[0].lines if label in str(it.get_label()))
@@ -110,7 +110,7 @@ def scattered(overlay: str, identifications: Path) -> Any:
     write_object(folder / "expected.json", {"quantities": items, "trades": [], "notes": []})
     with styled():
         files = identifications, folder / "target.csv", folder / "expected.json"
-        return draw_scatter(case, *files, [])
+        return draw_scatter(case, *files)
 
 
 def test_bands_of_the_confidence_are_drawn_of_what_is_determined(identifications: Path) -> None:

@@ -124,6 +124,11 @@ def test_the_sentence_is_that_of_the_numbers() -> None:
         ({"generalized_maxwell": 50.0, "generalized_maxwell_2": 90.0}, "is not adequate: "),
         ({"generalized_maxwell": 50.0, "burgers": 90.0}, "suits the trace less well: Burgers"),
         ({"generalized_maxwell": 90.0, "burgers": 89.0}, "none of the 2 models tried suits"),
+        # By less than is worth a mention.
+        (
+            {"generalized_maxwell": 90.0, "liquid_drop": 84.0},
+            "(--model liquid_drop) suits it as well with 1 parameter less (BIC lower by 0.908).",
+        ),
         # By chance another model of as many parameters, or a richer one, fits a little better.
         ({"generalized_maxwell": 90.0, "burgers": 95.9}, "none of the 2 models tried suits"),
         ({"generalized_maxwell": 90.0, "burgers": 96.1}, "less well: Burgers"),
@@ -132,7 +137,9 @@ def test_the_sentence_is_that_of_the_numbers() -> None:
         tried = nested_fits.ranked(list(gained), misfits, READINGS)
         assert said in nested_fits.advice(tried, "generalized_maxwell")
         other = nested_fits.preferred(tried, "generalized_maxwell")
-        assert (other is None) == ("none of" in said)
+        advice = nested_fits.advice(tried, "generalized_maxwell", spared=4)
+        assert (other is None) == ("none of the 2 models" in advice)
+        assert (other is None) == ("better; 4 more could not, however well they fit" in advice)
         words = "None of the 2 models tried is adequate: the best of them, "
         inadequate = nested_fits.advice(tried, "generalized_maxwell", adequate=False)
         assert inadequate.startswith(words) == (other is not None)

@@ -114,6 +114,7 @@ def test_noise_is_found_and_said() -> None:
     np.testing.assert_array_equal(other.residuals(TRUTH)[0], fit.problem.residuals(TRUTH)[0])
 
 
+@pytest.mark.nightly
 def test_noise_that_grows_with_the_rotation_leaves_good_samples_in() -> None:
     """Three spikes are struck, each of fifteen times the noise of its sample."""
     trace, spikes = noisy(Noise("gaussian", 0.05, "signal")), [200, 500, 700]

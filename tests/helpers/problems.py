@@ -17,7 +17,7 @@ from biogrip.physics.noise import Noise, add_noise, nuisance_basis
 from biogrip.physics.protocol import Course, sample_times
 from biogrip.physics.response import step_response, superpose
 from biogrip.physics.sample_model import SampleModel
-from biogrip_study.methods.registry import identifier
+from biogrip_study.methods.registry import identify_by
 from tests.helpers.default import STUDY
 
 MODEL = MODELS["generalized_maxwell"]
@@ -59,8 +59,8 @@ def problem(case: str, seed: int, rate_Hz: float = 1.0) -> TraceProblem:
 
 
 def run(method: str, posed: TraceProblem, seed: int = 0) -> Fit:
-    identify = identifier(method, STUDY.config.method(method))
-    (answer,) = identify([posed], [np.random.default_rng(seed)], silent)
+    settings, rng = STUDY.config.method(method), np.random.default_rng(seed)
+    (answer,) = identify_by(method, settings, [posed], [rng], silent)
     return answer
 
 

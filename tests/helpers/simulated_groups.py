@@ -102,7 +102,7 @@ def in_words(design: Design) -> str:
 
 _DISHES = {
     f"{a} and {b} dishes of {100 * x:.0f} and {100 * y:.0f} %": Design(units=(a, b), scatter=(x, y))
-    for a, b in ((3, 3), (3, 6), (3, 10), (5, 5), (5, 10), (10, 10))
+    for a, b in ((3, 3), (3, 6), (4, 10), (5, 5), (5, 10), (10, 10))
     for x, y in ((0.1, 0.1), (0.2, 0.2), (0.4, 0.1), (0.1, 0.4))
 }
 _DAYS = {

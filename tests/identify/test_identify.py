@@ -66,7 +66,7 @@ def test_a_study_gives_the_answer_of_the_command(
     study = study_of(yaml.safe_dump({**FEW, "only": ["mine"], "cases": {"mine": mine}}))
     case = study.case("mine")
     record(case, file, tmp_path / "trace.npz")
-    judge(case, tmp_path / "trace.npz", [], tmp_path / "judged.json")
+    judge(case, tmp_path / "trace.npz", tmp_path / "judged.json")
     of_study = json.loads((tmp_path / "judged.json").read_text())
     of_command = identified(tmp_path, file, "--model", model, config=yaml.safe_dump(FEW | lab))
     for key in ("fit", "reasons", "samples", "threshold", "certainty", "quantities", "notes"):
@@ -120,6 +120,7 @@ TYPED = (
 )
 
 
+@pytest.mark.nightly
 def test_the_method_needs_neither_the_study_nor_snakemake(tmp_path: Path) -> None:
     """Of every command, in a process in which importing either is an error."""
     shutil.copytree(ROOT / "data", tmp_path / "data")

@@ -56,6 +56,18 @@ def test_a_stretch_that_does_not_move_is_held_at_its_mean() -> None:
     np.testing.assert_allclose(np.linalg.norm(errors, axis=0)[[0, -1]], expected, rtol=0.3)
 
 
+def test_a_few_rows_between_steps_are_held_as_the_noise_of_all_rows_tells() -> None:
+    """Chi^2 of six rows' mean over 200 records; what rises by far more than noise stays."""
+    rng, ratios = np.random.default_rng(5), []
+    for _ in range(200):
+        values = np.repeat([0.0, 1.0], (6, 200)) + 0.03 * rng.standard_normal(206)
+        found, errors = smoothed(values)
+        ratios.append(found[0] ** 2 / np.sum(errors[:, 0] ** 2))
+    assert np.mean(ratios) == pytest.approx(1.0, abs=0.35)
+    values[:6] += 0.1 * np.arange(6)
+    np.testing.assert_array_equal(smoothed(values)[0][:6], values[:6])
+
+
 def test_a_rounded_course_is_smoothed_within_half_a_step() -> None:
     course = 1 - np.cos(2 * np.pi * np.arange(300) * 0.04 / 6)
     found, errors = smoothed(np.round(course / 0.1) * 0.1)

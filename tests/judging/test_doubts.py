@@ -194,6 +194,7 @@ def test_limits_of_quiet_traces_allow_for_a_wrong_model() -> None:
     assert np.all(limits["high"] < 2 * limits["low"])
 
 
+@pytest.mark.nightly
 def test_of_a_sensor_that_is_logged_more_often_than_read_one_of_each_reading_is_kept() -> None:
     time_s, times = np.arange(1, 601) / 10, 5
     values = 1500 + 3000 * np.exp(-time_s / 2) + 20 * np.random.default_rng(0).standard_normal(600)
@@ -226,6 +227,7 @@ def test_rounding_is_named_and_limits_allow_for_it() -> None:
     assert np.all(limits["high"] < 3 * limits["low"])
 
 
+@pytest.mark.nightly
 def test_rounding_rejects_no_trace_that_has_long_come_to_rest() -> None:
     """Most readings of a creep are the same, which a fit follows: few errors tell of rounding."""
     time_s = np.arange(0.1, 60.0, 0.1)

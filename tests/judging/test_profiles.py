@@ -168,6 +168,7 @@ def test_the_search_range_determines_no_relaxation_time() -> None:
     assert found.loc["tau_s", "low"] > 100
 
 
+@pytest.mark.nightly
 def test_a_fitted_onset_leaves_the_limits_that_every_onset_has() -> None:
     """With the best onset alone the damper would be known from below, too."""
     experiment = set_up(GRIPPER, (hold(20.0, 1e-9), hold(40.0, 0.4e-9)), Sample("kelvin_voigt"))

@@ -126,7 +126,7 @@ def test_limits_of_creep_with_an_offset() -> None:
     found = by_name(tell(TIMES, readings, reads="strain", noise_sd=0.02, offset=True))
     rows = np.column_stack((YIELDED, np.ones_like(TIMES), -np.ones_like(TIMES)))
     least, _ = fitted(rows, readings)
-    rise = found["J(1 to 10 s)"]
+    rise = found["J(10 s) - J(1 s)"]
     held = np.append(np.exp(-RATES[1:]) - np.exp(-10 * RATES[1:]), [9.0, 0.0, 0.0])
     for end in between(rise):
         squares, _ = fitted(np.vstack((rows, 1e4 * held)), np.append(readings, 1e4 * end))

@@ -14,6 +14,7 @@ from biogrip_study.page import answers
 from biogrip_study.page.page import entry_of, write_report
 from biogrip_study.records.identifications import read_verdicts
 from tests.helpers.browser import Opened
+from tests.helpers.links import links_of
 from tests.helpers.places import ROOT
 from tests.helpers.problems import MODEL, rotation
 from tests.helpers.runs import TINY
@@ -32,18 +33,24 @@ def opened(browser: Any, report: Path) -> Iterator[Opened]:
     page.close()
 
 
-def test_the_page_needs_nothing_else_and_links_its_files(opened: Opened, report: Path) -> None:
+def test_the_page_needs_nothing_else(opened: Opened, report: Path) -> None:
     assert report.stat().st_size < 8_000_000
     told = "['width', 'height'].map(name => +it.getAttribute(name))"
     of_image = f"all => all.map(it => [[it.naturalWidth, it.naturalHeight], {told}])"
     sizes = opened.page.locator("img").evaluate_all(of_image)
     assert len(sizes) > 10
     assert all(natural == told and min(told) > 0 for natural, told in sizes)
-    text = report.read_text("utf-8")
-    link = r'<p class="made">File <a href="([\w./-]+)"><code>results/\1</code></a></p>'
-    files = re.findall(link, text)
-    assert len(files) == text.count('<p class="made">') > 30
-    assert [file for file in files if not (report.parent / file).is_file()] == []
+
+
+@pytest.mark.parametrize("published", [False, True])
+def test_every_link_of_a_page_leads_somewhere(report: Path, published: bool) -> None:
+    pages = [*(ROOT / "results" / "published").rglob("*.html")] if published else [report]
+    pages += [] if published else [*report.parent.glob("summaries/*.html")]
+    assert pages
+    for page in pages:
+        links, dead = links_of(page)
+        assert dead == []
+        assert len(links) > 5 or page.parent.name == "summaries"
 
 
 SMALLEST_LETTERS = """Math.min(...[...document.querySelectorAll('p, li, td, dd, figcaption')]
@@ -77,10 +84,17 @@ def test_the_page_answers_first_and_from_its_tables(opened: Opened, report: Path
     titles, who = {"liquid_drop_2": "Liquid drop, case 2"}, "Run again, the paper's"
     page, own = opened.page, "genetic algorithm"
     assert page.locator("h1 + .split .answers p:not(.soft)").all_text_contents() == [
-        answers.say_what_traces_tell(read_table(tables / "coverage.csv"), titles).replace("_", ""),
         legible(answers.say_what_the_study_gives(compared, own, titles, who, 1.0)),
         legible(answers.say_which_method_finds_it(compared, own)),
     ]
+    table = page.locator("h1 + .split .answers .share")
+    counts = read_table(tables / "coverage.csv")
+    expected = [f"{row['shown_determined']} of {row['shown_seeds']}" for row in counts]
+    assert [" ".join(it.split()[1:]) for it in table.locator("td").all_inner_texts()] == expected
+    # Wilson's limits of 0 of 1 and 1 of 1.
+    said = " ".join(page.locator(".narrow + p.soft").inner_text().split())
+    assert "0 of 1 means at most 79 % of all traces, 1 of 1 at least 21 %. Sums hold" in said
+    assert table.evaluate("it => it.getBoundingClientRect().bottom") < 900
     told = page.locator("#tables summary").all_text_contents()
     captions = [text.split(". ", 1)[1] for text in map(str.strip, told) if ". " in text]
     assert len(captions) == len(set(captions)) > 5
@@ -122,7 +136,7 @@ def test_tables_have_titles_powers_and_right_aligned_numbers(opened: Opened, rep
     aligned = "all => all.map(e => getComputedStyle(e).textAlign)"
     assert {*cells.filter(has_text="·10⁻").evaluate_all(aligned)} == {"right"}
     page = opened.page
-    assert page.locator("caption").count() == 1
+    assert page.locator("caption").count() == 2
     # Full ones are folded, and can be downloaded.
     assert page.locator("details[open]").count() == 0
     links = page.locator("a[download]").evaluate_all("all => all.map(a => [a.download, a.href])")

@@ -52,7 +52,7 @@ def test_a_number_that_the_paper_rounds_may_be_five_percent_off() -> None:
 
 
 def case_of(table: int) -> Any:
-    published = Published(table=table, generation=70, identified=PRINTED, error_percent={})
+    published = Published(table=table, identified=PRINTED, error_percent={})
     known = {"sample": Sample("generalized_maxwell"), "parameters": TRUE, "published": published}
     study = seen(near_noise_tolerance=0.02, config=seen(methods=["genetic"]))
     return seen(name="mine", seeds=3, title="Mine", noise=seen(level=0.1), study=study, **known)

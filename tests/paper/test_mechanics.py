@@ -335,7 +335,7 @@ def test_one_that_changes_nothing_finds_what_the_study_finds(tmp_path: Path) -> 
     case = study.case(CASE)
     simulate_target(case, target)
     measure(case, range(3), target, measured)
-    identify_seeds(case, "genetic", range(3), measured, [], ours_file, tmp_path / "h.npz")
+    identify_seeds(case, "genetic", range(3), measured, ours_file, tmp_path / "h.npz")
     (tmp_path / CASE).mkdir()
     files = [tmp_path / CASE / f"{name}.csv" for name in study.config.readings]
     for file in files:

@@ -87,6 +87,16 @@ def test_a_step_between_two_rows_stands_in_the_middle() -> None:
         np.testing.assert_array_equal(same[:, 1], other)
 
 
+def test_a_step_among_the_noise_of_a_sensor_is_one_and_noise_is_none() -> None:
+    """Of 40 records with noise of 5 % all have the one step; a rise within two rows is none."""
+    rows_s, rng = np.arange(200.0), np.random.default_rng(0)
+    for _ in range(40):
+        noise = 0.05 * rng.standard_normal(200)
+        for risen, steps in ((rows_s > 9, 1), (np.clip(rows_s - 9, 0, 2) / 2, 0), (0 * rows_s, 0)):
+            record = np.column_stack((rows_s, risen + noise))
+            assert len(with_steps(record, noise_sd=0.05)[1]) == steps
+
+
 def test_a_row_off_a_line_has_the_mean_of_the_rates_on_both_sides() -> None:
     values = EVEN + 0.4 * (EVEN[100] == EVEN)
     before, after = rates_at(follow_rows(EVEN, values, deforms=True), EVEN[99:102])

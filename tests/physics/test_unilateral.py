@@ -11,7 +11,7 @@ from biogrip.physics.response import step_response, superpose
 from biogrip_study.gripper.simulation import jaw_force
 from biogrip_study.gripper.unilateral import (
     UnilateralResponse,
-    _torques_after,
+    _after,
     unilateral_response,
 )
 from tests.helpers.responses import random_samples
@@ -50,7 +50,7 @@ def test_the_jaws_press_or_the_gap_is_open(
     states, force = (each.reshape(-1, len(time_s), 5) for each in (states, found.jaw_force_N))
     rates = states @ np.array([1, -8, 0, 8, -1]) / (12 * step)
     (*phi, delta, y), force, touching = states[..., 2], force[0, :, 2], found.touching[2::5]
-    ends = np.array(sorted({*torque.time_s, *found.parted_s, *found.met_s}))
+    ends = np.array(sorted({*torque.time_s, *found.changes_s}))
     smooth = np.all(np.abs(np.subtract.outer(time_s, ends)) > 2 * step, axis=1)
     b, largest = gripper.lever_m, 2e-9
     for arm, own, rate in zip((SLOW, right), phi, rates, strict=False):
@@ -69,7 +69,7 @@ def test_the_jaws_press_or_the_gap_is_open(
     jumps = np.abs(np.diff(both.reshape(4, -1, 2))[..., 0]).max(axis=1)
     assert np.all(jumps < 1e-6 * np.abs(states).max(axis=(1, 2)))
     assert np.all(both[:, 0] == 0)
-    assert len(found.parted_s) >= 1
+    assert len(found.changes_s) >= 1
 
 
 def test_over_the_whole_range_the_jaws_never_pull(either_gripper: Gripper, steps: Course) -> None:
@@ -82,7 +82,7 @@ def test_over_the_whole_range_the_jaws_never_pull(either_gripper: Gripper, steps
         assert np.all(found.jaw_force_N >= 0)
         gap = found.shortening_m - either_gripper.lever_m * found.rotation.sum(axis=0)
         assert np.all(gap > -1e-9 * found.shortening_m.max())
-        until = time_s < (found.parted_s[0] if found.parted_s else 400.0)
+        until = time_s < (found.changes_s[0] if found.changes_s else 400.0)
         assert np.max(np.abs(found.jaw_force_N - both)[until]) < 1e-6 * both.max()
         response = step_response(either_gripper, network, inertia=False)
         for arm in (0, 1):
@@ -90,9 +90,9 @@ def test_over_the_whole_range_the_jaws_never_pull(either_gripper: Gripper, steps
             away = np.abs(found.rotation[arm] - expected)
             # And to rounding of arms that nothing is between.
             assert np.max(away[until]) < 1e-10 * expected.max() + 1e-14 * 1.6e-9 / 4.4e-7
-        assert bool(found.parted_s) == bool(both.min() < -1e-9 * both.max())
+        assert bool(found.changes_s) == bool(both.min() < -1e-9 * both.max())
 
 
 def test_a_torque_is_counted_from_within_its_phase() -> None:
-    """Of 1 + 2 t + 3 t^2/2 after 2 s: 1 + 4 + 6, 2 + 6, and 3, of both arms."""
-    assert _torques_after(np.array([1.0, 2.0, 3.0]), 2.0).tolist() == [[11.0, 8.0, 3.0]] * 2
+    """Of 1 + 2 t + 3 t^2/2 after 2 s: 1 + 4 + 6, 2 + 6, and 3."""
+    assert _after(np.array([1.0, 2.0, 3.0]), 2.0).tolist() == [11.0, 8.0, 3.0]

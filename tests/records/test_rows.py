@@ -108,7 +108,7 @@ def test_a_damaged_target_is_explained(tmp_path: Path, readings: int) -> None:
         read_target(path, TIMES)
 
 
-@pytest.mark.parametrize("known", [{}, {"target": TIMES - 1}, {"sd": TIMES + 0.1}])
+@pytest.mark.parametrize("known", [{}, {"target": TIMES - 1}, {"known": {"sd": TIMES + 0.1}}])
 def test_measurements_are_read_back(tmp_path: Path, known: dict[str, Any]) -> None:
     path = tmp_path / "seeds_3-7.npz"
     traces = {seed: np.random.default_rng(seed).random(5) for seed in (3, 4, 5, 6, 7)}
@@ -120,8 +120,8 @@ def test_measurements_are_read_back(tmp_path: Path, known: dict[str, Any]) -> No
         for seed, trace in read.readings.items():
             np.testing.assert_array_equal(trace, traces[seed])
             assert trace.flags.c_contiguous
-        for name in ("time_s", "target", "sd"):
-            np.testing.assert_array_equal(getattr(read, name), getattr(given, name))
+        for name in ("time_s", "target", "known"):
+            np.testing.assert_equal(getattr(read, name), getattr(given, name))
 
 
 def test_damaged_measurements_are_named(tmp_path: Path) -> None:

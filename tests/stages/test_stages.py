@@ -18,10 +18,11 @@ from tests.helpers.default import STUDY, seen, study_of
 from tests.helpers.places import EXAMPLE
 
 
-def drop(torque_Nm: float, *more: Phase, unilateral: bool = False) -> Any:
+def drop(torque_Nm: float, *more: Phase, contact: str | None = None) -> Any:
     torque, sample = join_phases((hold(100.0, torque_Nm), *more)), Sample("maxwell")
     device = {"instrument": GRIPPER, "gripper": STUDY.gripper, "stroke": 0.0785}
-    held = {"torque": torque, "times_s": sample_times(torque.end_s, 1.0), "unilateral": unilateral}
+    held = {"torque": torque, "times_s": sample_times(torque.end_s, 1.0)}
+    held |= {"block": seen(contact=contact)}
     known = {"name": "Drop", "sample": sample, "nonlinear_target": False, **device, **held}
     return seen(network=sample.model.network([1.0, 1.0]), **known)
 
@@ -48,7 +49,7 @@ def test_a_protocol_that_makes_the_jaws_pull_is_warned_of(
     force = pd.read_csv(file)["jaw_force_N"].to_numpy()
     assert np.all(force[time_s < 100] >= 0)
     assert force[time_s > 100].max() < 0
-    target.simulate_target(drop(1e-9, hold(100.0, 1e-10), unilateral=True), file)
+    target.simulate_target(drop(1e-9, hold(100.0, 1e-10), contact="unilateral"), file)
     assert "contact is lost there, which its identification ignores" in capsys.readouterr().out
     force = pd.read_csv(file)["jaw_force_N"].to_numpy()
     assert np.all(force[time_s > 100] == 0)
@@ -62,7 +63,7 @@ def test_all_stages_weight_the_readings_of_a_recorded_trace(tmp_path: Path) -> N
     mine = f"cases: {{mine: {{sample: {{model: liquid_drop}}, measurement: {keys}}}}}"
     case = study_of(mine).cases["mine"]
     target.record(case, EXAMPLE, tmp_path / "t.npz")
-    found = experiment_for(case.experiment, read_measurements(tmp_path / "t.npz", [0]), [])
+    found = experiment_for(case.experiment, read_measurements(tmp_path / "t.npz", [0]))
     assert found.sd is not None
     assert found.noise_sd == pytest.approx(np.sqrt(np.mean(found.sd**2)))
 
@@ -70,7 +71,7 @@ def test_all_stages_weight_the_readings_of_a_recorded_trace(tmp_path: Path) -> N
 def test_without_noise_the_fit_is_the_truth_and_not_the_rounding_of_digits(tmp_path: Path) -> None:
     case, file = STUDY.case("endothelial_cell"), tmp_path / "expected.json"
     target.simulate_target(case, tmp_path / "target.csv")
-    expect(case, tmp_path / "target.csv", [], file)
+    expect(case, tmp_path / "target.csv", file)
     found = json.loads(file.read_text())
     values = {each["quantity"]: each["value"] for each in found["quantities"]}
     # The damper that is not there has the lower end of its search range.
@@ -83,7 +84,7 @@ def test_of_a_target_of_another_sample_its_parameters_are_expected(tmp_path: Pat
     case, file = STUDY.case("endothelial_cell"), tmp_path / "expected.json"
     stiffer = study_of("cases: {endothelial_cell: {sample: {k: 35.2}}}").case("endothelial_cell")
     target.simulate_target(stiffer, tmp_path / "target.csv")
-    expect(case, tmp_path / "target.csv", [], file)
+    expect(case, tmp_path / "target.csv", file)
     values = {row["quantity"]: row["value"] for row in json.loads(file.read_text())["quantities"]}
     # Fits leave out the inertia that targets have; 35.0 is off by 6e-3.
     assert values["k"] == pytest.approx(35.2, rel=3e-3)

@@ -25,6 +25,7 @@ from biogrip_study.tables import cases
 from biogrip_study.tables.study import methods, models
 from tests.helpers.default import STUDY, seen, study_of
 
+WITHIN_2_PERCENT: Any = seen(near_noise_tolerance=0.02)
 FOUND = {"k": 9.0, "k_p": 1.0, "c": 3.0, "c_p": 2.0}
 ERRORS = dict(zip(FOUND, ("10", "-", "25", ">100"), strict=True))
 PAPER = Published(table=9, identified=FOUND, error_percent=ERRORS)
@@ -222,15 +223,15 @@ def found(misfit: list[float], noise: list[float | None]) -> pd.DataFrame:
 
 def test_two_basins_have_a_tenth_of_the_runs_each() -> None:
     """And none is told where the noise is unknown, or absent."""
-    one = basins(found([1.05, 1.01, *[1.2] * 18], [1.0, 1.0, *[1.19] * 18]), 0.02)
+    one = basins(found([1.05, 1.01, *[1.2] * 18], [1.0, 1.0, *[1.19] * 18]), WITHIN_2_PERCENT)
     assert {name: len(runs) for name, runs in one.items()} == {ALL: 20}
-    two = basins(found([1.05, 1.06, *[1.2] * 18], [1.0, 1.0, *[1.19] * 18]), 0.02)
+    two = basins(found([1.05, 1.06, *[1.2] * 18], [1.0, 1.0, *[1.19] * 18]), WITHIN_2_PERCENT)
     assert two["above the noise"]["seed"].tolist() == [0, 1]
     assert two["near the noise"]["seed"].tolist() == list(range(2, 20))
     for noise in (None, 0.0):
-        assert list(basins(found([3.0, 1.0], [noise, noise]), 0.02)) == [ALL]
+        assert list(basins(found([3.0, 1.0], [noise, noise]), WITHIN_2_PERCENT)) == [ALL]
     runs = found([1.019, 1.021, 2.03, 1.0], [1.0, 1.0, 2.0, None])
-    np.testing.assert_array_equal(near_noise(runs, 0.02), [True, False, True, False])
+    np.testing.assert_array_equal(near_noise(runs, WITHIN_2_PERCENT), [True, False, True, False])
 
 
 def test_chi_squared_increases_over_the_lowest_of_its_trace() -> None:

@@ -53,7 +53,7 @@ def judged(tmp_path_factory: pytest.TempPathFactory) -> Path:
         files.append(folder / name / method / "seeds_0-4.csv")
         files[-1].parent.mkdir(parents=True)
         write_rows(files[-1], identification_columns(MODEL), rows)
-    stage.judge_points(STUDY, "both", files, [], folder / f"{CASE}.csv")
+    stage.judge_points(STUDY, "both", files, folder / f"{CASE}.csv")
     return folder / f"{CASE}.csv"
 
 

@@ -162,6 +162,7 @@ def test_the_clock_of_a_smooth_load_is_doubted(tmp_path: Path, late_rows: float)
         assert float(late_s) == pytest.approx(0.025, rel=0.3)
 
 
+@pytest.mark.nightly
 def test_a_load_that_tells_no_clock_is_left_alone(tmp_path: Path) -> None:
     """Under a ramp an earlier load is a little more of what is there, whatever the sample."""
     clock, load = np.arange(0.0, 30.0, 0.1), 0.2 * np.arange(0.0, 30.0, 0.1)

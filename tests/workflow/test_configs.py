@@ -22,6 +22,7 @@ CASES = {
 CONFIG = TINY | {"seeds": 1, "only": list(CASES), "cases": CASES}
 
 
+@pytest.mark.nightly
 def test_a_study_writes_in_its_folder_alone(tmp_path: Path) -> None:
     """Of every kind of case: overlays that are published identify such samples, nightly."""
     mine, here = tmp_path / "mine", tmp_path / "here"
@@ -48,6 +49,7 @@ def test_a_wrong_config_stops_with_one_message(tmp_path: Path) -> None:
     assert len(run.splitlines()) < 16
 
 
+@pytest.mark.nightly
 def test_another_clone_is_not_run_with_the_code_and_config_of_this_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -16,7 +16,6 @@ import yaml
 from tests.helpers.places import ROOT
 from tests.helpers.runs import SMALL, clone, ran
 
-SHOWN = re.compile(r"^```sh\n(biogrip identify data/[^`]*)```[^`]*^```text\n(.*?)^```", re.S | re.M)
 BLOCK = re.compile(r'^```(\w+)(?: title="([^"]+)")?\n(.*?)^```$', re.DOTALL | re.MULTILINE)
 # Those that change the copy's code come last.
 HOWTOS = sorted(
@@ -79,24 +78,14 @@ def test_what_is_said_can_be_done(document: str, place: Path) -> None:
 
 
 @pytest.mark.nightly
-def test_what_is_shown_is_printed(tmp_path: Path) -> None:
-    shutil.copytree(ROOT / "data", tmp_path / "data")
-    texts = ((ROOT / "docs" / document).read_text(encoding="utf-8") for document in DOCUMENTS)
-    shown = [pair for text in texts for pair in SHOWN.findall(text)]
-    assert len(shown) > 3
-    for commands, lines in shown:
-        typed = [shlex.split(line, comments=True) for line in commands.splitlines()]
-        printed = [ran(tmp_path, *each, PYTHONPATH=str(ROOT / "src")) for each in typed]
-        assert [line for line in lines.splitlines() if line not in "".join(printed)] == []
-
-
-@pytest.mark.nightly
 def test_what_the_readme_types_runs(place: Path) -> None:
     (place / "tiny_fit.yaml").write_text(TINY_FIT)
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     for line in re.findall(r"^    (biogrip .*)$", text, re.MULTILINE):
         ran(place, *_typed(shlex.split(line)), PYTHONPATH=str(place / "src"))
-    assert all((place / name).is_file() for name in ("page.html", "found.csv", "cells.png"))
+    assert all(
+        (place / name).is_file() for name in ("fit.png", "page.html", "found.csv", "cells.png")
+    )
 
 
 def _typed(command: list[str]) -> list[str]:

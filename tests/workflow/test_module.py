@@ -22,6 +22,7 @@ def host(folder: Path, text: str, *arguments: str) -> str:
     return called(folder, "-j2", "--workflow-profile", "none", *arguments)
 
 
+@pytest.mark.nightly
 def test_rules_are_changed_under_a_prefix_and_the_host_is_as_it_was(tmp_path: Path) -> None:
     (tmp_path / "host.yaml").write_text("samples: {1: a, 2: b}\n")
     text = f"""

@@ -104,6 +104,7 @@ def test_a_dry_run_says_which_setting_changed_from_what_to_what(tiny: Path) -> N
         assert re.search(rf"{when}: {{[^:]*{evaluation}", told)
 
 
+@pytest.mark.nightly
 def test_an_edited_or_older_trace_in_the_place_of_another_is_read(tiny_copy: Path) -> None:
     """As by `mv`, `cp -p`, or an archive: the date alone says that nothing has changed."""
     trace = tiny_copy / "mine.csv"
@@ -120,6 +121,7 @@ def test_an_edited_or_older_trace_in_the_place_of_another_is_read(tiny_copy: Pat
         assert bool(said) == bool(jobs)
 
 
+@pytest.mark.nightly
 def test_an_edit_of_the_library_runs_everything_again_and_is_named(
     tiny: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -58,6 +58,7 @@ def test_a_recorded_trace_has_verdicts_and_no_errors(tiny: Path) -> None:
     assert total["low"] < found < total["high"]
 
 
+@pytest.mark.nightly
 def test_snakemakes_report_shows_tables_figures_and_pages(tiny: Path, tmp_path: Path) -> None:
     report = tmp_path / "report.html"
     snakemake(tiny, "--report", report, config=TINY)

@@ -38,6 +38,7 @@ def lab(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.mark.nightly
 def test_batches_give_the_table_of_the_command(lab: Path) -> None:
     """Of rows with another gripper and another comb, too."""
     columns = "gripper.arm_length_m\tactuator.thickness_m", "\t", "\t", "1.6e-3\t4.0e-5"

@@ -29,7 +29,7 @@ from biogrip.physics.noise import Noise, add_noise, rms, standard_deviation, str
 from biogrip.physics.protocol import sample_times
 from biogrip.physics.simulation import simulated_response
 from biogrip_study.config.study import Case, Study
-from biogrip_study.gripper.calibration import FreeMotion, calibrate, free_motion
+from biogrip_study.gripper.calibration import calibrate, free_motion
 from biogrip_study.records.identifications import (
     near_noise,
     read_histories,
@@ -314,8 +314,8 @@ def judge_free_arm(results: Results, evidence: str) -> list[Judged]:
     motion = free_motion(arm, time_s, *causes)
     noise = Noise("gaussian", test.noise_level, "peak")
     rng = stream(results.study.config.study_seed, "claims", 0, "calibration")
-    step, impulse = (add_noise(clean, noise, rng) for clean in (motion.step, motion.impulse))
-    fitted = calibrate(FreeMotion(time_s, step, impulse), *causes).arm
+    measured = np.stack([add_noise(clean, noise, rng) for clean in motion])
+    fitted, _ = calibrate(time_s, measured, *causes)
     errors = [100 * abs(getattr(fitted, key) / getattr(arm, key) - 1) for key in ARM_KEYS]
     verdict = REPLICATED if max(errors) <= 100 * CLOSE else NOT
     return [("", verdict, evidence.format(*errors, noise=100 * test.noise_level))]
@@ -445,7 +445,7 @@ def read_reading(study: Study, compared: pd.DataFrame | None, file: Path) -> pd.
         compared is not None
         and title in compared.loc[compared["verdict"] == EXCLUDED, "reading"].to_numpy()
     )
-    near = near_noise(found, study.near_noise_tolerance)
+    near = near_noise(found, study)
     return found.assign(near_noise=near, judging=not excluded, reading=title)
 
 
@@ -504,7 +504,7 @@ def read_runs(case: Case, identifications: Path, histories: Path) -> dict[str, p
     best = read_histories(histories, "genetic", ["best_misfit", *names]).rename(columns=names)
     change = best.groupby("seed")["best_misfit"].diff()
     falls = best["generation"].where(change < 0, 0).groupby(best["seed"]).max()
-    found["near_noise"] = near_noise(found, case.study.near_noise_tolerance)
+    found["near_noise"] = near_noise(found, case.study)
     found = found.assign(last_improvement=found["seed"].map(falls))
     # Of a run that has stopped before, the last generation.
     at_20 = best[best["generation"] <= 20].groupby("seed", as_index=False).last()

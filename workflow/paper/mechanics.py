@@ -333,7 +333,7 @@ def _loss_of(study_seed: int, case: Case) -> list[Row]:
         return []
     time_s = case.times_s
     free = unilateral_response(*device, time_s)
-    if not free.parted_s:
+    if not free.changes_s:
         return []
     # As the targets of a case are written.
     read = simulated_response(*device, time_s)[0], free.rotation[0]
@@ -342,7 +342,7 @@ def _loss_of(study_seed: int, case: Case) -> list[Row]:
         stream(study_seed, case.name, seed, "noise") for seed in range(min(case.seeds, _MOST_SEEDS))
     ]
     noise = np.array([add_noise(held, case.noise, rng, time_s) - held for rng in rngs])
-    lost_s, every = free.parted_s[0], len(time_s)
+    lost_s, every = free.changes_s[0], len(time_s)
     until = int(np.searchsorted(time_s, lost_s))
     medians = {
         column: _medians(study_seed, case, time_s[:readings], rotation, noise[:, :readings])

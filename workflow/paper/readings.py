@@ -276,7 +276,7 @@ def found_by_readings(study: Study, found: Found) -> ShownTable:
     rows: list[Row] = []
     for reading, block in study.config.readings.items():
         for case, mine in _of(study, found, reading):
-            near = near_noise(mine, study.near_noise_tolerance)
+            near = near_noise(mine, study)
             row: Row = {"case": case.name, "reading": block.title, "seeds": len(mine)}
             row |= zip(_SHARES, share_with_limits(int(near.sum()), len(mine)), strict=True)
             table = case.published.table
@@ -284,7 +284,7 @@ def found_by_readings(study: Study, found: Found) -> ShownTable:
                 target = sum(case.parameters[part] for part in name.split(" + "))
                 row[f"error_percent {name}"] = 100 * np.abs(mine[name] / target - 1).median()
             rows.append(row | {"last_improvement": mine["last_improvement"].median()})
-    words = near_noise_words(study.near_noise_tolerance)
+    words = near_noise_words(study)
     columns = (
         *titled("case", "reading", "seeds"),
         *map(Column, _SHARES, (f"Share {words}", "95 % from", "to"), (2, 2, 2)),

@@ -27,10 +27,10 @@ for package in (TOP / "src" / "biogrip_study", TOP.parent):
         )
 
 from biogrip.errors import BiogripError
-from biogrip.files import digest_of
+from biogrip.files import digest_of, software
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.traces.measurement_block import MeasurementBlock
-from biogrip_study.config.shipped import shipped, study_software
+from biogrip_study.config.shipped import shipped
 from biogrip_study.config.study import load_given_study
 from biogrip_study.methods.registry import METHODS
 from biogrip_study.stages.job import CASE_KEYS, STUDY_KEYS, batch_names, keys_of_cases, settings
@@ -51,7 +51,7 @@ CONFIGS = [Path(file) for file in workflow.configfiles]
 KNOWN = {*config, "__use_yte__"}
 CONFIGS = [it for it in CONFIGS if KNOWN & {*yaml.safe_load(it.read_text("utf-8"))}]
 STUDY = usable(load_given_study, config, CONFIGS)
-SOFTWARE = study_software()
+SOFTWARE = software(Path(biogrip_study.__file__).parent)
 # Config keys, of which each rule names those that its jobs use: what is controlled and read, and
 # of which sample; what a fit assumes besides; when a simulated trace is sampled; its noise; and
 # columns of a recorded trace.

@@ -149,31 +149,24 @@ rule verdict_counts:
         "../scripts/stage.py"
 
 
-rule convert_table:
+rule markdown_table:
     input:
         page="results/tables/{name}.html",
     output:
-        converted="results/tables/{name}.{format}",
+        markdown="results/tables/{name}.md",
     log:
-        "results/logs/convert_table/{name}.{format}.log",
-    wildcard_constraints:
-        format="md|tex",
+        "results/logs/markdown_table/{name}.log",
     localrule: True
     params:
         **settings_of(),
-        stages=["biogrip_study.tables.layout.write_converted"],
+        stages=["biogrip_study.tables.layout.write_markdown"],
     message:
-        "Writing the table {wildcards.name} as {wildcards.format}"
+        "Writing the table {wildcards.name} as Markdown"
     script:
         "../scripts/stage.py"
 
 
-# Every table in a format that papers or forges read.
-rule latex_tables:
-    input:
-        made("tables", ".tex"),
-
-
+# Every table in a format that forges read.
 rule markdown_tables:
     input:
         made("tables", ".md"),

@@ -7,11 +7,12 @@ killed, costs no other its result, and what is done is not done again.
 import os
 import sys
 import traceback
+from base64 import b64decode
 from collections import defaultdict
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
-from multiprocessing import get_context
+from multiprocessing import get_all_start_methods, get_context
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any, TypeVar
@@ -29,18 +30,19 @@ from biogrip.command.outputs import (
     write_result,
 )
 from biogrip.command.settings import Asked, check_settings, read_trace
-from biogrip.command.sheet import is_table, read_table
+from biogrip.command.sheet import by_sample, is_table, read_table
 from biogrip.command.words import in_columns, in_words
 from biogrip.config.case import SampleCase
 from biogrip.config.loading import trace_defaults
 from biogrip.errors import BiogripError
-from biogrip.files import digest_of, software
+from biogrip.files import atomic_write, digest_of, software
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.problem import SearchRange
 from biogrip.identify.data import trace_data
 from biogrip.identify.identify import STEPS, budget, identify_alike
 from biogrip.identify.other_fits import Trace
 from biogrip.identify.prepare import prepare
+from biogrip.identify.together import Together, identify_sample_of
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.keys import plain
 from biogrip.processes import end_with
@@ -54,6 +56,10 @@ MOST_DRAWN = 50
 
 # Most traces of a batch, and most readings that are fitted together, of short traces.
 _MOST_IN_BATCH, _MOST_READINGS = 25, 200_000
+
+# Keys of a trace's result that a sample of several has not.
+_OF_ONE_TRACE = {"read_as", "load", "onset_s", "onset_limits_s", "contact_m", "contact_limits_m"}
+_OF_ONE_TRACE |= {"offset_rad", "drift_rad_per_s", "jaw_force"}
 
 _KILLED = "a process was killed, perhaps because memory ran out"
 
@@ -69,42 +75,50 @@ def identify_files(
     output: Path | None = None,
     report: Path | None = None,
     table: Path | None = None,
+    plot: Path | None = None,
     rows: tuple[int, int] | None = None,
+    together: bool = False,
 ) -> int:
     """Identify traces and tables of traces, write the results, and print them.
 
     Config and settings are those of all traces. `output` is the JSON file of a single trace, by
-    default one beside each; `report` and `table` are HTML and CSV files to write, if any. `rows`
-    are the first and last row of a table to identify, from 0, without JSON files; by default all.
+    default one beside each; `report`, `table` and `plot` are HTML, CSV and PNG files, if any.
+    `rows` are the first and last sample of a table to identify, from 0, without JSON files; by
+    default all. With `together` all traces are of one sample.
 
     Return 1 if any of several traces could not be used. A `BiogripError` says that an option, the
     config or the only trace cannot.
     """
-    asked = traces_of(files, config, settings)
-    alone = len(files) == 1 and asked[0].place == Asked.place
+    asked = [*by_sample(traces_of(files, config, settings), together=together)]
+    alone = together or (len(files) == 1 and asked[0].place == Asked.place)
     if rows is not None:
         # The last may be beyond the end.
         asked = asked[rows[0] : rows[1] + 1]
     absent = {
-        own.name: f"{own.place}: {problem}"
+        own.name: f"{trace.place}: {problem}"
         for own in asked
-        if (problem := trace_file_problem(own.trace))
+        for trace in own.traces
+        if (problem := trace_file_problem(trace.trace))
     }
     every = [own for own in asked if own.name not in absent]
     if alone and absent:
-        raise BiogripError(absent[str(files[0])])
+        raise BiogripError(absent[asked[0].name])
     if output is not None and not alone:
         raise BiogripError("--output: only for one trace; each of several gets its own file.")
+    if plot is not None and not (alone and plot.suffix == ".png"):
+        text = f"found {visible(plot)}; allowed is a name that ends with .png, of one trace."
+        raise BiogripError(f"--plot: {text} For several there is --report.")
     # Errors of options and config concern all traces: they are raised once, here.
     check_settings(every)
     outputs = [output or own.output for own in every] if rows is None else []
     names = [own.name for own in every]
     written = [*zip(names, outputs, strict=False), ("--report", report), ("--csv", table)]
-    check_outputs(written, [*files, *(own.trace for own in every), *filter(None, [config])])
-    drawn = report is not None and len(every) <= MOST_DRAWN
+    read = [trace.trace for own in every for trace in own.traces]
+    check_outputs(written, [*files, *read, *filter(None, [config])])
+    drawn = bool(report or plot) and len(every) <= MOST_DRAWN
     outcome = _identify_traces(every, outputs or None, drawn=drawn)
     if alone and outcome.refused:
-        raise BiogripError(outcome.refused[str(files[0])])
+        raise BiogripError(outcome.refused[asked[0].name])
     copied = {own.name: own.copied for own in asked}
     outcome = replace(outcome, refused=outcome.refused | absent, copied=copied)
     if table is not None:
@@ -113,10 +127,13 @@ def identify_files(
         from biogrip.command.page import write_page
 
         write_page(outcome, report)
+    if plot is not None and (pictures := outcome.pictures.get(names[0])):
+        with atomic_write(plot) as scratch:
+            scratch.write_bytes(b64decode(pictures[0].partition(",")[2]))
     print(in_words(outcome.found[0]) if alone else in_columns(outcome.found, outcome.refused))
     pairs = zip(every, outputs, strict=False)
     made = [path for own, path in pairs if own.name not in outcome.refused]
-    if said := [visible(path) for path in (*made, report, table) if path]:
+    if said := [visible(path) for path in (*made, report, table, plot) if path]:
         print(f"Written to {', '.join(said)}.")
     return 1 if outcome.refused else 0
 
@@ -153,7 +170,7 @@ def _identify_traces(
         text = f"{len(found)} of {len(asked)} traces are taken from their JSON files, as they and"
         print(f"{text} what is asked have not changed.", file=sys.stderr)
     left = [number for number, own in enumerate(asked) if own.name not in found]
-    processors = len(os.sched_getaffinity(0))
+    processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 2
     size = max(1, min(_MOST_IN_BATCH, -(-len(left) // processors)))
     batches = [left[start : start + size] for start in range(0, len(left), size)]
     every = Outcome([], {})
@@ -191,6 +208,9 @@ def side_by_side(work: Callable[[J], T], jobs: Sequence[J], most: int) -> Iterat
     there at once; they are forked, and end when this one does, however that ends. An error that
     work raises is raised here.
     """
+    if "fork" not in get_all_start_methods():  # on Windows
+        yield from map(work, jobs)
+        return
     fork, parent = get_context("fork"), os.getpid()
     running: dict[Any, tuple[int, Any]] = {}
     done: dict[int, T | None] = {}
@@ -239,6 +259,8 @@ def side_by_side(work: Callable[[J], T], jobs: Sequence[J], most: int) -> Iterat
 
 def _made_from(asked: Asked) -> str:
     """Return in one line what the result of a trace follows from."""
+    if asked.together:
+        return "; ".join(map(_made_from, asked.together))
     trace, default = digest_of(asked.trace), digest_of(trace_defaults())
     return repr((software(), default, str(asked.trace), trace, asked.given))
 
@@ -250,21 +272,34 @@ def identify_batch(
     alone = len(asked) == 1 and outputs is not None
     # Before anything is read: what is changed meanwhile is identified again.
     made_from = [] if outputs is None else [*map(_made_from, asked)]
+    every = [(index, trace) for index, own in enumerate(asked) for trace in own.traces]
     read: dict[int, tuple[SampleCase, Trace]] = {}
     refused: dict[str, str] = {}
     outcome = Outcome([], {})
     with Progress(asked[0].name if alone else "", 1 + STEPS, live=alone, quiet=not alone) as told:
-        for index, trace in enumerate(asked):
-            with _caught(trace, refused):
+        for number, (index, trace) in enumerate(every):
+            with _caught(asked[index], refused):
                 recording, case = read_trace(trace)
                 if not is_usual(recording):
                     told.note(form_in_words(trace.trace, recording.form))
-                read[index] = case, prepare(recording, case.judged_experiment)
+                read[number] = case, prepare(recording, case.judged_experiment)
+        read = {of: it for of, it in read.items() if asked[every[of][0]].name not in refused}
         results: dict[int, dict[str, Any]] = {}
-        for index, diagnosis in _diagnosed(asked, read, refused, told):
+        parts = defaultdict[int, dict[int, tuple[Diagnosis, dict[str, Any]]]](dict)
+        for number, diagnosis in _diagnosed([asked[of] for of, _ in every], read, refused, told):
+            index, own = every[number]
             trace = asked[index]
             with _caught(trace, refused):
-                results[index] = data_of(diagnosis, read[index][0], trace.name, trace.given)
+                data = data_of(diagnosis, read[number][0], own.name, own.given)
+                parts[index][number] = diagnosis, data
+                if len(parts[index]) < len(trace.traces):
+                    continue
+                if trace.together:
+                    names = [own.name for own in trace.together]
+                    given = [said for _, said in sorted(parts[index].items())]
+                    diagnosis, data = sample_of(trace.name, dict(zip(names, given, strict=True)))
+                results[index] = data
+                del parts[index]
             if index in results and outputs is not None:
                 write_result(outputs[index], results[index], made_from[index])
             if index in results and drawn:
@@ -292,16 +327,12 @@ def _diagnosed(
         few = len(recording.time_s) * _MOST_IN_BATCH <= _MOST_READINGS
         alike[budget(experiment), None if few else index].append(index)
 
-    def doing(step: str) -> None:
-        progress.done()
-        progress.doing(step)
-
     groups = [*alike.values()]
     for group in groups:
         traces, failed = [read[index][1] for index in group], dict[str, str]()
         diagnoses: list[Diagnosis] = []
         with _caught(asked[group[0]], failed):
-            diagnoses = identify_alike(traces, progress=progress.within, doing=doing)
+            diagnoses = identify_alike(traces, progress.within, progress.doing)
         yield from zip(group, diagnoses, strict=False)
         # An error is of one of a group: it is then identified one by one.
         if failed and len(group) > 1:
@@ -355,6 +386,21 @@ def data_of(
         ],
         "versions": {name: it for name, it in software().items() if name != "source"},
     }
+
+
+def sample_of(
+    name: str, traces: Mapping[str, tuple[Diagnosis, dict[str, Any]]]
+) -> tuple[Together, dict[str, Any]]:
+    """Identify a sample from traces that were; return it, and all that is said of it as plain data.
+
+    Of each trace, by name, there are its diagnosis and its `data_of`.
+    """
+    diagnoses, said = zip(*traces.values(), strict=True)
+    sample = identify_sample_of([*traces], diagnoses)
+    shared = {key: it for key, it in said[0].items() if key not in _OF_ONE_TRACE}
+    at_s = shared["assumed"]["identifiability"]["at_s"]
+    without = {"without_model": sample.without_model(at_s).data(), "traces": [*said]}
+    return sample, {**shared, "trace": name, **sample.data(), **without}
 
 
 def _assumed(found: Experiment, case: SampleCase, tried: Sequence[str]) -> dict[str, Any]:

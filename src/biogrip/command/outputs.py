@@ -129,14 +129,15 @@ _OF_READINGS = ("misfit_rad", "noise_rad", "scatter_rad", "offset_rad", "drift_r
 def as_written(data: Mapping[str, Any]) -> dict[str, Any]:
     """Return the result of a trace, `data_of`, as it comes back from its JSON file."""
     # Assumptions, which must be repeatable, are not rounded.
-    return json.loads(json.dumps(rounded_numbers(data) | {"assumed": data["assumed"]}))
+    kept = {"assumed": data["assumed"]}
+    if "traces" in data:
+        kept["traces"] = [as_written(trace) for trace in data["traces"]]
+    return json.loads(json.dumps(rounded_numbers(data) | kept))
 
 
 def write_result(path: Path, data: Mapping[str, Any], made_from: str) -> None:
     """Write the result of a trace, `data_of`, as JSON, with a digest of what it was made from."""
-    read = INSTRUMENTS[data["reads"]["quantity"]].read
-    written, names = as_written(data), {name: _in_units(name, read) for name in _OF_READINGS}
-    write_object(path, {**_renamed(written, names), "assumed": written["assumed"]}, made_from)
+    write_object(path, _renamed(as_written(data), written=True), made_from)
 
 
 def read_result(path: Path, made_from: str) -> dict[str, Any]:
@@ -144,17 +145,22 @@ def read_result(path: Path, made_from: str) -> dict[str, Any]:
 
     If it was made from anything else, or is not as it was written, it is a `BiogripError`.
     """
-    written = read_object(path, "the result of a trace", made_from)
-    read = INSTRUMENTS[written["reads"]["quantity"]].read
-    names = {_in_units(name, read): name for name in _OF_READINGS}
-    return {**_renamed(written, names), "assumed": written["assumed"]}
+    return _renamed(read_object(path, "the result of a trace", made_from), written=False)
 
 
-def _renamed(data: Any, names: Mapping[str, str]) -> Any:
+def _renamed(data: dict[str, Any], *, written: bool) -> dict[str, Any]:
+    """Return a result whose keys name the unit of what is read, if written, or radians."""
+    read = INSTRUMENTS[data["reads"]["quantity"]].read
+    pairs = ((name, _in_units(name, read)) for name in _OF_READINGS)
+    names = dict(pair if written else pair[::-1] for pair in pairs)
+
     def renamed(own: dict[str, Any]) -> dict[str, Any]:
         return {names.get(key, key): each for key, each in own.items()}
 
-    return json.loads(json.dumps(data), object_hook=renamed)
+    kept = {"assumed": data["assumed"]}
+    if "traces" in data:
+        kept["traces"] = [_renamed(trace, written=written) for trace in data["traces"]]
+    return {**json.loads(json.dumps(data), object_hook=renamed), **kept}
 
 
 def _in_units(name: str, read: Channel) -> str:
@@ -167,9 +173,9 @@ def table_of(outcome: Outcome) -> tuple[list[str], list[list[Any]]]:
     Of what any linear sample would show, it has what was asked for, or else levels and exponents.
     Rows are in the order of what is copied.
     """
-    # The same is read in all traces.
-    names = {each["reads"]["quantity"] for each in outcome.found} or {ROTATION.name}
-    read = INSTRUMENTS[names.pop()].read
+    # The same is read in all traces, but in those of one sample.
+    names = [each["reads"]["quantity"] for each in outcome.found if "traces" not in each]
+    read = INSTRUMENTS[names[0] if names else ROTATION.name].read
     rows: dict[str, dict[str, Any]] = {}
     for each in map(rounded_numbers, outcome.found):
         row = {name: each[name] for name in COLUMNS if name in each}
@@ -180,6 +186,9 @@ def table_of(outcome: Outcome) -> tuple[list[str], list[list[Any]]]:
             METHODS: " ".join(set_up_in_words(each)),
             LINEAR: "yes" if each["without_model"]["is_linear"] else "no",
         }
+        if "traces" in each:
+            told = {"traces": len(each["traces"]), "one sample p": each["agreement"]["p"]}
+            row |= {**told, "noise_rad": "", "misfit_rad": ""}
         without = each["without_model"]["quantities"]
         if not each["assumed"]["identifiability"]["at_s"]:
             without = [own for own in without if own["kind"] in (LEVEL, EXPONENT)]

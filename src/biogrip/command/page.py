@@ -5,6 +5,7 @@ Pictures are Matplotlib's. A page of very many traces has the figure and the tab
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -28,12 +29,15 @@ from biogrip.figures.cells import ONE_COLUMN_IN, draw_cells
 from biogrip.figures.fit import draw_fit, fit_of
 from biogrip.figures.likelihood import draw_profiles_of
 from biogrip.files import write_text
+from biogrip.identify.together import Together
 from biogrip.judging.cells import CELL, Told, compare, gather, shared_columns
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.judging.doubts import DOUBTFUL, OK, REJECTED
 from biogrip.judging.without_model import LEVEL, level_turned
 from biogrip.page.templates import data_url, environment
-from biogrip.physics.protocol import evaluate, hold, join_phases
+from biogrip.physics.drawing import sketched
+from biogrip.physics.models import CANDIDATES
+from biogrip.physics.protocol import evaluate, hold, join_phases, largest_load
 from biogrip.physics.simulation import simulated_response
 from biogrip.terminal import visible_lines
 
@@ -42,8 +46,8 @@ _STATUS_MARKS = {OK: "✓", DOUBTFUL: "!", REJECTED: "✕"}
 _GROUPS_SHOWN, _ALL, _MOST_PANELS = 6, "all traces", 6
 # Most traces whose pictures are open, and printed.
 _MOST_OPEN = 3
-# Times at which a level is drawn.
-_BAND = 25
+# Times at which a level is drawn; size of the picture of a fit, which is read on a telephone, too.
+_BAND, _FIT_IN = 25, (4.4, 3.4)
 
 
 def trace_pictures(diagnosis: Diagnosis, data: Mapping[str, Any]) -> list[str]:
@@ -51,10 +55,10 @@ def trace_pictures(diagnosis: Diagnosis, data: Mapping[str, Any]) -> list[str]:
 
     A third one is of the level over time, as far as that is told without a model.
     """
-    drawn = draw_best(diagnosis)
+    drawn, told = draw_best(diagnosis), data["without_model"]["quantities"]
     with style.styled():
-        more = [draw_level(diagnosis, data)] if data["without_model"]["quantities"] else []
-        return [_address(picture) for picture in (drawn, draw_profiles_of(data), *more)]
+        more = [draw_level(diagnosis, data)] if told and diagnosis.recording else []
+        return [address(picture) for picture in (drawn, draw_profiles_of(data), *more)]
 
 
 def draw_level(diagnosis: Diagnosis, data: Mapping[str, Any]) -> Figure:
@@ -88,11 +92,49 @@ def draw_level(diagnosis: Diagnosis, data: Mapping[str, Any]) -> Figure:
     return drawn
 
 
+def draw_joint(sample: Together) -> Figure:
+    """Draw every trace of a sample, what the joint fit shows, and residuals over the noise.
+
+    Traces that read one quantity share a panel, each over its largest load, but of a sweep, or
+    where what is read is relative to it.
+    """
+    values = {finding.quantity.label: finding.value for finding in sample.findings}
+    reads = dict.fromkeys(single.identified[1].instrument.read for single in sample.traces)
+    drawn = style.figure(style.COLUMN_IN * len(reads), 3.6)
+    panels = drawn.subplots(2, len(reads), sharex="col", squeeze=False, height_ratios=[2.4, 1])
+    colors = cycle(style.COLORS.values())
+    for name, single, color in zip(sample.names, sample.traces, colors, strict=False):
+        recording, experiment = single.identified
+        instrument = experiment.instrument
+        fit = fit_of(experiment, values, recording.time_s, recording.readings, recording.sd)
+        top, below = panels[:, [*reads].index(instrument.read)]
+        alone = instrument.relative or instrument.sweeps
+        load = 1.0 if alone else abs(largest_load(experiment.phases))
+        noise_sd = single.likelihood.noise_sd if fit.sd is None else fit.sd
+        at, left = np.abs(fit.time_s), (fit.measured - fit.fitted) / noise_sd
+        for axes, values_of in ((top, fit.measured / load), (below, left)):
+            axes.plot(at, values_of, ".", color=color, markersize=1.2)
+        look = "_" if instrument.sweeps else "-"
+        top.plot(at, fit.fitted / load, look, color=color, label=style.literal(name))
+        unit = f"{fit.read.unit or 1}/{instrument.controlled.unit or 1}"
+        over = "" if alone else f" over {instrument.controlled.name}"
+        top.set_ylabel(with_unit(fit.read.title + over, fit.read.unit if alone else unit))
+        below.set_xlabel("angular frequency (rad/s)" if instrument.sweeps else "time (s)")
+        if instrument.sweeps:
+            top.set(xscale="log", yscale="log")
+    panels[1, 0].set_ylabel("residual over noise")
+    drawn.legend(loc="outside upper left", ncols=2)
+    return drawn
+
+
 def draw_best(diagnosis: Diagnosis) -> Figure:
     """Draw a trace, its best fit and the residuals over the time of the file's clock.
 
     Where readings spread over decades after the protocol's start, time is counted from there.
     """
+    if isinstance(diagnosis, Together):
+        with style.styled():
+            return draw_joint(diagnosis)
     recording, experiment = diagnosis.identified
     values = {finding.quantity.label: finding.value for finding in diagnosis.findings}
     fit = fit_of(experiment, values, recording.time_s, recording.readings, recording.sd)
@@ -102,13 +144,16 @@ def draw_best(diagnosis: Diagnosis) -> Figure:
         fit = replace(fit, time_s=fit.time_s + start_s)
     with style.styled():
         drawn = draw_fit({"best fit": fit}, "")
+        drawn.set_size_inches(*_FIT_IN)
         if spread and start_s:
             drawn.axes[-1].set_xlabel(f"time since {start_s:.6g} s of the clock (s)")
     return drawn
 
 
-def _address(drawn: Figure) -> str:
-    return data_url("image/png", style.png_of(drawn, 64))
+def address(drawn: Figure) -> str:
+    """Return a figure as a PNG of few colours, as a data URL."""
+    with style.styled():
+        return data_url("image/png", style.png_of(drawn, 64))
 
 
 def draw_every_trace(outcome: Outcome, columns: Mapping[str, str]) -> tuple[Figure, str]:
@@ -155,7 +200,7 @@ def write_page(outcome: Outcome, page: Path) -> None:
     if several and traces:
         with style.styled():
             drawn, groups = draw_every_trace(outcome, columns)
-            figure_of_all = _address(drawn)
+            figure_of_all = address(drawn)
     outcomes = [(data["trace"], data["fit"], " ".join(data["reasons"])) for data in traces]
     outcomes += [(trace, FAILED, reason) for trace, reason in outcome.refused.items()]
     further = outcome_in_words(outcomes) if several else preferred_in_words(traces[0])
@@ -186,6 +231,7 @@ def write_page(outcome: Outcome, page: Path) -> None:
                 status: sum(data["fit"] == status for data in traces) for status in _STATUS_MARKS
             },
             words=words,
+            drawing_of=lambda name: sketched(CANDIDATES[name].model),
             written_by=f"{WRITTEN_BY} {__version__}",
         )
     )

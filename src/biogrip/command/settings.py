@@ -95,17 +95,28 @@ class Asked:
     """What tells the trace from others of its file: cells of its row."""
     arrays: tuple[Array, ...] = ()
     """Times, readings and perhaps standard deviations, (n_samples,) each, instead of a file."""
+    sample: str = ""
+    """Name of a sample of several traces; the file is then that of its first one."""
+    together: tuple["Asked", ...] = ()
+    """The traces of such a sample."""
+
+    @property
+    def traces(self) -> tuple["Asked", ...]:
+        """The traces of the sample: of one, itself."""
+        return self.together or (self,)
 
     @property
     def name(self) -> str:
-        """The file, and which of its traces."""
-        return f"{self.trace} {self.part}".rstrip()
+        """The file, and which of its traces; or the sample."""
+        return self.sample or f"{self.trace} {self.part}".rstrip()
 
     @property
     def output(self) -> Path:
         """The usual JSON file: no two names of traces give one, but those with .csv and without."""
-        part = _UNSAFE.sub(lambda mark: quote(os.fsencode(mark[0]), safe=""), self.part)
-        name = ".".join(filter(None, (self.trace.name.removesuffix(".csv"), part)))
+        told = self.sample or self.part
+        part = _UNSAFE.sub(lambda mark: quote(os.fsencode(mark[0]), safe=""), told)
+        file = "" if self.sample else self.trace.name.removesuffix(".csv")
+        name = ".".join(filter(None, (file, part)))
         return self.trace.with_name(f"{name}.identified.json")
 
     @property
@@ -376,14 +387,16 @@ def _instrument(merged: Mapping[str, Any], given: Mapping[str, Any]) -> Instrume
 def check_settings(traces: Sequence[Asked]) -> None:
     """Refuse settings that cannot be used, of all traces at once, before anything is fitted.
 
-    So are traces of different quantities. A `BiogripError` has the first few problems.
+    So are traces of different quantities, but of one sample. A `BiogripError` has the first few
+    problems.
     """
-    for config in dict.fromkeys(file for asked in traces for file in asked.configs):
+    every = [trace for own in traces for trace in own.traces]
+    for config in dict.fromkeys(file for asked in every for file in asked.configs):
         for note in read_config_of(TraceConfig, [config])[1]:
             print(note, file=sys.stderr)
     read: dict[str, str] = {}
     problems: dict[str, None] = {}
-    for own in traces:
+    for own in every:
         key = repr([(setting.path, setting.value) for setting in own.settings])
         if key in read:
             continue
@@ -393,7 +406,7 @@ def check_settings(traces: Sequence[Asked]) -> None:
             read[key] = ""
             problems |= dict.fromkeys(str(error).split("\n"))
         first, *others = dict.fromkeys(filter(None, read.values())) or [""]
-        if read[key] in others:
+        if read[key] in others and own in traces:
             text = f"{own.place}: found a reading of {read[key]}, but a reading of {first} before; "
             problems[f"{text}allowed is one quantity read for all traces of a command."] = None
     refuse_all([*problems])

@@ -14,6 +14,7 @@ from difflib import get_close_matches
 from io import StringIO
 from itertools import zip_longest
 from pathlib import Path
+from typing import Any
 
 from biogrip.command.options import OPTIONS, REPLACED, Setting
 from biogrip.command.outputs import COLUMNS
@@ -32,6 +33,8 @@ _OF_NUMBERS: tuple[str, ...] = ("hold", "ramp", "noise", "noise_share", "start",
 _OF_WORDS: tuple[str, ...] = ("noise_model", "offset", "drift", "reading", "shape")
 # Other names of what is held.
 _HELD = {"held", "load", "pressure", "indentation", *(channel.name for channel in CONTROLLED)}
+# Column of samples of several traces, and name of one whose traces are all that there are.
+_SAMPLE, _TOGETHER = "sample", "together"
 _SEPARATORS = ",;\t"
 _OF_RESULTS = re.compile(r".* (verdict|value|low|high)( \(.*\))?")
 _HEAD_BYTES = 100_000
@@ -135,6 +138,24 @@ def read_table(
         found[index] = replace(own, part=part)
     refuse_all(problems)
     return found
+
+
+def by_sample(asked: Sequence[Asked], *, together: bool = False) -> Iterator[Asked]:
+    """Yield samples: rows with one name in a column `sample` are of one, or all `together` are.
+
+    Of other cells, those that differ within a sample stand side by side.
+    """
+    samples = defaultdict[str | int, list[Asked]](list)
+    for number, own in enumerate(asked):
+        cells = {_plain(name): cell for name, cell in own.copied.items()}
+        samples[_TOGETHER if together else cells.get(_SAMPLE) or number].append(own)
+    for name, traces in samples.items():
+        first, cells = traces[0], {}
+        for column in first.copied:
+            every = dict.fromkeys(own.copied.get(column, "") for own in traces)
+            cells[column] = "; ".join(every)
+        several: dict[str, Any] = {"sample": name, "together": tuple(traces), "copied": cells}
+        yield replace(first, **several) if traces[1:] else first
 
 
 def _parts(traces: Sequence[Path], set_by: Sequence[Mapping[str, str]]) -> list[str]:

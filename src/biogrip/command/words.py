@@ -6,6 +6,7 @@ from math import log
 from textwrap import indent
 from typing import Any
 
+import biogrip.levels as levels
 from biogrip import __version__
 from biogrip.digits import counted, instant, legible, plain, with_limits, with_unit, within_limits
 from biogrip.judging.doubts import DOUBT, DOUBTFUL, HARMLESS, OK, REJECTED, REJECTION
@@ -25,13 +26,14 @@ _LINES = 5
 _MOST_NAMED = 5
 # Share of a quantity below which no error of the instrument is worth a line.
 _LEAST_MOVE = 1e-4
+_LIKELIHOOD_RATIO = "That they are of one sample was tested by likelihood ratios."
 _NUMBER = re.compile(r"\d[\d.e+-]*")
-# What the notes of a weight do to the fit.
-_MEANS = {
+MEANS = {
     OK: "the residuals look like noise",
     DOUBTFUL: "trust the limits only if you can rule out the reasons given",
     REJECTED: "the model cannot give this trace, so that it has no limits",
 }
+"""What a status of a fit means."""
 _SAID = {HARMLESS: "note", DOUBT: DOUBTFUL, REJECTION: REJECTED}
 
 
@@ -40,7 +42,7 @@ def in_words(found: Mapping[str, Any]) -> str:
     width = max(len(item["quantity"]) for item in found["quantities"])
     rejected = found["fit"] == REJECTED
     lines = [
-        f"{visible(found['trace'])}: fit {found['fit']}: {_MEANS[found['fit']]}.",
+        f"{visible(found['trace'])}: fit {found['fit']}: {MEANS[found['fit']]}.",
         *(f"  {visible(reason)}" for reason in found["reasons"]),
         misfit_in_words(found),
         *(without_model_in_words(found) if rejected else []),
@@ -56,20 +58,31 @@ def in_words(found: Mapping[str, Any]) -> str:
     lines += [f"Note: {visible(text)}" for text in further_notes(found)]
     lines += [found["advice"]] if found["advice"] else []
     lines += [taken_for_granted(found)] if found["by_default"] else []
+    if traces := found.get("traces"):
+        lines += ["Each trace by itself:", in_columns(traces, {})]
+        lines += [f"{visible(each['trace'])}: {it}" for each in traces for it in terms_of(each)]
     return "\n".join(lines)
+
+
+def terms_of(found: Mapping[str, Any]) -> list[str]:
+    """Return lines on the noise of a trace, and on what of its instrument was fitted along."""
+    return [misfit_in_words(found), *fitted_in_words(found)[len(given_in_words(found)) :]]
 
 
 def without_model_in_words(found: Mapping[str, Any]) -> list[str]:
     """Return lines on what any linear sample would show."""
     own, told = found["without_model"], foremost(found)
     left = f"{plain(own['times_noise'], 2)} times the noise"
-    if found["instrument"] != _SWEEPS:
+    if not _by_noise(found):
         left = f"{in_unit(own['misfit_rad'], found)}, {left}"
     if not told:
-        return [f"No linear sample fits, whatever its model: the least misfit is {left}."]
+        why = f"no linear viscoelastic sample fits; the least RMS residual is {left}"
+        too_large = "with so large a noise the trace tells nothing"
+        return [f"Model-free: {too_large if own['times_noise'] < 1 else why}."]
     width = max(len(each["quantity"]) for each in told)
     lines = (f"  {each['quantity']:<{width}}  {each['in_words']}" for each in told)
-    return [f"Any linear sample that fits, whatever its model (least misfit {left}), has:", *lines]
+    any_sample = "Model-free, any linear viscoelastic sample that fits"
+    return [f"{any_sample} (least RMS residual {left}), has:", *lines]
 
 
 def rows_of_moves(found: Mapping[str, Any]) -> list[tuple[str, dict[str, float]]]:
@@ -121,15 +134,24 @@ def foremost(found: Mapping[str, Any]) -> list[Mapping[str, Any]]:
 def misfit_in_words(found: Mapping[str, Any]) -> str:
     """Return the number of readings, their noise, and the misfit of the best fit."""
     said, noise = f"{found['samples']} readings", noise_in_words(found)
-    if found["instrument"] != _SWEEPS:
+    if not _by_noise(found):
         noise = f"{noise} {in_unit(found['scatter_rad'], found)}"
-        return f"{said}, {noise}, misfit (RMS) {in_unit(found['misfit_rad'], found)}"
+        few = found["misfit_rad"] < levels.TOO_LITTLE * found["scatter_rad"]
+        why = " (too large, as few readings follow the course)" if few else ""
+        return f"{said}, {noise}{why}, RMS residual {in_unit(found['misfit_rad'], found)}"
     ratio = plain(found["misfit_rad"] / found["scatter_rad"], 2)
-    return f"{said}, misfit {ratio} times the {noise}"
+    return f"{said}, RMS residual {ratio} times the {noise}"
+
+
+def _by_noise(found: Mapping[str, Any]) -> bool:
+    """Return True if misfits are told over the noise: those of several traces are, too."""
+    return found["instrument"] == _SWEEPS or "traces" in found
 
 
 def noise_in_words(found: Mapping[str, Any]) -> str:
     """Return the noise that a misfit is held against: given, modelled, or seen in the trace."""
+    if "traces" in found:
+        return f"noise of each of {len(found['traces'])} traces"
     if found["fit"] == REJECTED and found["noise_model"]:
         return "noise that cannot be told from misfit"
     given = found["assumed"]["measurement"]
@@ -231,7 +253,7 @@ def in_columns(found: Sequence[Mapping[str, Any]], refused: Mapping[str, str]) -
         lines.append(aligned(rows, ["trace", "fit", *columns.values()]))
         lines.append(f"{100 * found[0]['confidence']:g} % limits; ? where the trace tells nothing.")
         fits = {each["fit"] for each in found}
-        lines += [f"Fit {fit}: {means}." for fit, means in _MEANS.items() if fit in fits]
+        lines += [f"Fit {fit}: {means}." for fit, means in MEANS.items() if fit in fits]
         lines += [*one_sided_in_words(found), *_once(found, lambda each: [each["limits"]])]
         lines += _once(found, _provided)
         lines += _once(found, given_in_words)
@@ -331,6 +353,9 @@ _MOST_PHASES, _MOST_REFUSED = 4, 3
 
 def set_up_in_words(found: Mapping[str, Any]) -> list[str]:
     """Return sentences on instrument, protocol, model, noise, limits and conditions of a trace."""
+    if traces := found.get("traces"):
+        text = f"{len(traces)} traces of a sample were fitted together, each over its own noise."
+        return [*together(map(set_up_in_words, traces)), text, _LIKELIHOOD_RATIO]
     instrument, assumed = INSTRUMENTS[found["reads"]["quantity"]], found["assumed"]
     under = "" if instrument.sweeps else f" under {_protocol(found)}"
     said = [f"{instrument.in_words}{under}."]
@@ -366,11 +391,8 @@ def preferred_in_words(found: Mapping[str, Any]) -> list[str]:
     if not found["preferred_model"]:
         return []
     lowest = min(found["models"], key=lambda row: row["delta_bic"])
-    count = len(found["models"]) + len(found["models_spared"])
-    return [
-        f"Of {count} models that were compared, that of the lowest BIC is another: "
-        f"{lowest['title']}."
-    ]
+    count = len(found["models"])
+    return [f"Of {count} models that were fitted, another has the lowest BIC: {lowest['title']}."]
 
 
 def _protocol(found: Mapping[str, Any]) -> str:

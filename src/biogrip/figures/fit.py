@@ -34,6 +34,8 @@ class FittedTrace:
     """Standard deviations of the readings, (n_samples,), where they are known."""
     read: Channel = ROTATION
     """What is read."""
+    curve: tuple[Array, Array] | None = None
+    """Times and fitted rotations between few readings, each (n,)."""
 
 
 def fit_of(
@@ -51,8 +53,14 @@ def fit_of(
     network = problem.model.sample({**parameters, **problem.fixed})
     device = problem.gripper, network, problem.torque
     simulated = simulated_response(*device, time_s)[0]
-    fitted = simulated + within(problem.nuisance(time_s), measured - simulated, sd)
-    return FittedTrace(time_s, target, measured, fitted, sd, problem.instrument.read)
+    added = within(problem.nuisance(time_s), measured - simulated, sd)
+    given = time_s, target, measured, simulated + added, sd, problem.instrument.read
+    if len(time_s) > _FEW_READINGS or problem.instrument.sweeps:
+        return FittedTrace(*given)
+    spaced = np.geomspace if style.is_over_decades(time_s) else np.linspace
+    between = np.union1d(spaced(time_s[0], time_s[-1], _FEW_READINGS)[1:-1], time_s)
+    course = simulated_response(*device, between)[0] + np.interp(between, time_s, added)
+    return FittedTrace(*given, curve=(between, course))
 
 
 def scale_of(values: Array, unit: str) -> tuple[float, str]:
@@ -71,7 +79,7 @@ def scale_of(values: Array, unit: str) -> tuple[float, str]:
 
 _READINGS: dict[str, Any] = {"linestyle": "", "marker": ".", "markersize": 1.2, "rasterized": True}
 # Readings that are drawn in full colour; of more, residuals have means of so many parts.
-_FEW_READINGS, _PALEST, _PARTS = 300, 0.25, 40
+_FEW_READINGS, _PALEST, _PARTS, _FEWEST = 300, 0.25, 40, 20
 
 
 def draw_traces(axes: Axes, fits: Mapping[str, FittedTrace]) -> tuple[float, str]:
@@ -85,15 +93,19 @@ def draw_traces(axes: Axes, fits: Mapping[str, FittedTrace]) -> tuple[float, str
         axes.plot(
             fit.time_s, factor * fit.target, color=style.TARGET, linewidth=2.4, label="target"
         )
-    for (label, fitted), color in zip(fits.items(), style.RUNS, strict=False):
-        axes.plot(fitted.time_s, factor * fitted.fitted, color=color, label=label)
+    for (label, fitted), color, dash in zip(fits.items(), style.RUNS, ("-", "--"), strict=False):
+        times, course = fitted.curve or (fitted.time_s, fitted.fitted)
+        axes.plot(times, factor * course, dash, color=color, label=label)
     axes.set_ylabel(with_unit(fit.read.title, unit))
     return factor, unit
 
 
 def _readings(count: int) -> dict[str, Any]:
-    """Style of readings, the paler the more there are, for curves to be seen."""
-    return _READINGS | {"alpha": max(min(1.0, _FEW_READINGS / count), _PALEST)}
+    """Style of readings, the paler the more, and the larger the fewer there are."""
+    look = {"alpha": max(min(1.0, _FEW_READINGS / count), _PALEST)}
+    look["clip_on"] = count > _FEW_READINGS
+    few = max(1.0, _FEW_READINGS / max(count, _FEWEST))
+    return _READINGS | look | {"markersize": few**0.75 * _READINGS["markersize"]}
 
 
 def _means(axes: Axes, time_s: Array, residual: Array) -> None:
@@ -102,7 +114,8 @@ def _means(axes: Axes, time_s: Array, residual: Array) -> None:
     times, parts = np.array_split(time_s, _PARTS), np.array_split(residual, _PARTS)
     error = [part.std(ddof=1) / np.sqrt(len(part)) for part in parts]
     at, mean = [part.mean() for part in times], [part.mean() for part in parts]
-    axes.errorbar(at, mean, error, fmt="o", color=style.BLUE, markersize=2, linewidth=0.8, zorder=3)
+    look: dict[str, Any] = {"color": style.BLUE, "markersize": 2, "linewidth": 0.8, "zorder": 3}
+    axes.errorbar(at, mean, error, fmt="o", label="means of residuals", **look)
 
 
 def draw_fit(
@@ -121,7 +134,6 @@ def draw_fit(
     low, high = (end([*axis_rad, end(fit.measured)]) for end in (np.min, np.max))
     margin = 0.02 * (high - low)
     traces.set_ylim(factor * (low - margin), factor * (high + margin))
-    drawn.legend(loc="outside upper left", ncols=2)
     traces.set_title(style.literal(title))
     residual = fit.measured - fit.fitted
     residual = factor * residual if fit.sd is None else residual / fit.sd
@@ -142,6 +154,7 @@ def draw_fit(
         residuals.set_xscale("log")
         if low > 0:
             traces.set(yscale="log", ylim=(0.8 * factor * low, 1.25 * factor * high))
+    drawn.legend(loc="outside upper left", ncols=2)
     drawn.align_ylabels()
     return drawn
 

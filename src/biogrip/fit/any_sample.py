@@ -22,7 +22,7 @@ import numpy as np
 from biogrip.arrays import Array, BoolArray
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.noise_model_fit import absorbed
-from biogrip.physics.modes import Modes, lag_course, mode_responses
+from biogrip.physics.modes import Modes, lag_course
 from biogrip.physics.protocol import SWEEP, Course
 from biogrip.physics.residuals import Residuals
 
@@ -109,7 +109,8 @@ def show_lags(residuals: Residuals, covered_s: tuple[float, float], more: Array)
     rows /= residuals.noise_scale
     sizes = np.maximum(np.linalg.norm(rows, axis=1), _NOTHING)
     # A slow lag yields in proportion to its rate, and a fast one resists in inverse proportion.
-    clear = sizes * (1 + (places if deforms else 1 / places))
+    fast = covered_s[0] * rates if residuals.parts else places
+    clear = sizes * (1 + (fast if deforms else 1 / places))
     clear /= clear.max()
     rows[clear < _UNSEEN] = 0.0
     return Lags(residuals, covered_s, rates, rows / sizes[:, None], sizes, clear < _FAINT)
@@ -166,9 +167,8 @@ class AnySampleFit:
 
     def _shown(self, residuals: Residuals) -> Array:
         """Return the same of unit amplitudes of the lags that it has, (n, n_samples)."""
-        course, own = residuals.course, self.amplitudes > 0
-        shown = mode_responses(-self.lags.rates[own][None], course, residuals.trace.time_s)[0]
-        return shown * ((1.0 if course.deforms else -1.0) / self.lags.sizes[own, None])
+        own = self.amplitudes > 0
+        return residuals.of_lags(self.lags.rates[own]) * (1 / self.lags.sizes[own, None])
 
 
 def count_lags(chosen: BoolArray) -> int:
@@ -184,7 +184,7 @@ def fit_any_sample(residuals: Residuals) -> AnySampleFit:
     # Imported here: loading it takes longer than a short job.
     from scipy.optimize import nnls
 
-    covered_s = residuals.course.covered_s(residuals.trace.time_s)
+    covered_s = residuals.covered_s
     measured = residuals.trace.rows / residuals.noise_scale
     lags, least = show_lags(residuals, covered_s, np.zeros(0)), np.inf
     for _ in range(_MOST_DIVISIONS):

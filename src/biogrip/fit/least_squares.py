@@ -216,7 +216,6 @@ def best_of_starts(
             finished = _count_responses(fine)[trace_of_fine == in_group].sum()
             misfit, evaluations = float(best.misfit[in_group]), rows[-1][3] + int(finished)
             rows[-1] = np.exp(best.x[in_group]), misfit, misfit, evaluations
-            progress(evaluations, misfit)
             steps, why, converged = (
                 len(rows) - 1,
                 "all starts fitted",
@@ -224,6 +223,7 @@ def best_of_starts(
             )
             given = rows[-1][0], misfit, steps, evaluations, why, History.of(rows), converged
             answers[index] = Fit(*given)
+            progress(len(answers) / len(problems))
     return [answers[index] for index in range(len(problems))]
 
 

@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike
 
 import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray
-from biogrip.digits import plain
+from biogrip.digits import counted, plain
 from biogrip.fit.least_squares import LeastSquaresSettings, fit_from, identify_many
 from biogrip.fit.problem import Fit, TraceProblem, silent
 from biogrip.physics.models import CANDIDATES, as_richer, contained, different_in
@@ -245,9 +245,9 @@ def aic_and_bic(
     AIC = n ln(misfit^2) + 2 (p + 1) and BIC = n ln(misfit^2) + (p + 1) ln n, the noise being one
     parameter more; of RMS misfits of best fits, n samples and p parameters, of any one shape.
     """
-    counted = np.asarray(parameters) + 1
+    free = np.asarray(parameters) + 1
     square = np.asarray(samples) * 2 * np.log(misfit)
-    return square + 2 * counted, square + counted * np.log(samples)
+    return square + 2 * free, square + free * np.log(samples)
 
 
 def ranked(candidates: Sequence[str], misfits: Sequence[float], samples: int) -> list[FittedModel]:
@@ -308,16 +308,15 @@ def advice(
     tried: Sequence[FittedModel], chosen: str, *, adequate: bool = True, spared: int = 0
 ) -> str:
     """State in a sentence whether BIC prefers another of the models tried, if adequate, to one."""
-    count = len(tried) + spared
     chosen_fit, best = _own_and_best(tried, chosen)
     title = chosen_fit.model.title[0].upper() + chosen_fit.model.title[1:]
     if best is chosen_fit:
-        return f"{title}: none of the {count} models tried suits the trace better."
+        return f"{title}: {_none_better(tried, chosen_fit, spared)}"
     named = f"{best.model.title} (--model {best.candidate})"
     lower = f"with a BIC lower by {plain(chosen_fit.delta_bic)}"
     if not adequate:
         return (
-            f"None of the {count} models tried is adequate: the best of them, {named}, "
+            f"None of the {len(tried)} models tried is adequate: the best of them, {named}, "
             f"{lower}, leaves more than noise, too."
         )
     if preferred_simpler(tried, chosen):
@@ -326,6 +325,19 @@ def advice(
     if len(best.model.names) == len(chosen_fit.model.names):
         return f"{title} suits the trace less well: {lead}"
     return f"{title} is not adequate: {lead}"
+
+
+def _none_better(tried: Sequence[FittedModel], chosen: FittedModel, spared: int) -> str:
+    """State that none is preferred, how many were not fitted, and what is simpler and as good."""
+    more = f"; {spared} more could not, however well they fit" if spared else ""
+    said = f"none of the {len(tried)} models tried suits the trace better{more}."
+    lowest = min(tried, key=lambda fitted: fitted.delta_bic)
+    fewer = len(chosen.model.names) - len(lowest.model.names)
+    if fewer <= 0:
+        return said
+    as_good = f"suits it as well with {counted(fewer, 'parameter')} less"
+    named = f"{lowest.model.title} (--model {lowest.candidate})"
+    return f"{said} {named} {as_good} (BIC lower by {plain(chosen.delta_bic)})."
 
 
 @dataclass(frozen=True)

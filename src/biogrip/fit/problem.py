@@ -99,15 +99,15 @@ def _value(genes: tuple[int, ...]) -> float:
     return float(f"{digits}e{genes[0] - len(digits)}")
 
 
-ReportProgress = Callable[[int, float], None]
-"""Callback that receives the number of simulated responses and the lowest misfit."""
+ReportProgress = Callable[[float], None]
+"""Callback that receives the share of the work that is done, 0 to 1."""
 
 
 HistoryRow = tuple[Array, float, float, int]
 """Row of a history: best parameters so far, lowest and median misfit, evaluations so far."""
 
 
-def silent(evaluations: int, misfit: float) -> None:
+def silent(share: float) -> None:
     """Ignore a report of progress."""
 
 

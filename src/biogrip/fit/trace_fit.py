@@ -99,7 +99,7 @@ def load_functions(
         return sensitivity[:0]
     shown = _shown_of_errors(experiment, time_s, parameters)
     shown = shown[np.argsort(-np.linalg.norm(shown, axis=1), kind="stable")]
-    most, rest = np.split(shown, [_MOST_FUNCTIONS])
+    most, rest = np.split(shown, [_MOST_NUMBERS // len(time_s)])
     basis = absorbed(sensitivity)
     return np.vstack((most, np.linalg.qr(rest @ basis.T, mode="r") @ basis))
 
@@ -159,9 +159,9 @@ def _thinned(count: int) -> IntArray:
 
 
 _MOST_ROUNDS = 5
-# Errors of a load with functions of their own; rows and readings that are looked at; lags of the
-# response to a ramp; how long a step lasts, over the time from row to row.
-_MOST_FUNCTIONS, _ROWS_SHOWN, _LAGS, _STEEP = 300, 3000, 1000, 1e-6
+# Numbers in functions of errors of a load that have their own; rows and readings looked at; lags of
+# the response to a ramp; how long a step lasts, over the time from row to row.
+_MOST_NUMBERS, _ROWS_SHOWN, _LAGS, _STEEP = 3_000_000, 3000, 1000, 1e-6
 # Step of differences, as a share of the largest depth; size of a free function over the noise.
 _OF_DEPTH, _FREE_OVER_NOISE = 1e-3, 1e5
 # Most e-folds by which noise is smaller beside them.

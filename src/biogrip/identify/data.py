@@ -84,6 +84,7 @@ def trace_data(diagnosis: Diagnosis) -> dict[str, Any]:
     assert models is not None
     instrument, said = experiment.instrument, judged_data(diagnosis)
     rejected = said["fit"] == REJECTED
+    spread_s = _spread_s(recording, experiment)
     return {
         "model": experiment.model.name,
         "model_title": experiment.model.title,
@@ -96,19 +97,23 @@ def trace_data(diagnosis: Diagnosis) -> dict[str, Any]:
         **said,
         "noise_model": fit.noise_data(),
         **models.data(rejected=rejected),
-        "moduli": None if rejected else _moduli(diagnosis, recording, experiment),
+        "moduli": None if rejected else moduli_between(*spread_s, diagnosis),
     }
 
 
-def _moduli(
-    diagnosis: Diagnosis, recording: Recording, experiment: Experiment
-) -> dict[str, list[float]]:
-    """Return moduli of the fit from one over the duration to one over the first interval."""
-    time_s = recording.time_s
-    first_s, last_s = experiment.torque.spread_s(time_s)
+def _spread_s(recording: Recording, experiment: Experiment) -> tuple[float, float]:
+    """Return the first interval and the duration, or inverse frequencies of a sweep."""
+    first_s, last_s = experiment.torque.spread_s(recording.time_s)
     if not experiment.instrument.sweeps:
+        time_s = recording.time_s
         first_s = float(np.diff(time_s)[np.searchsorted(time_s[:-2], 0.0)])
-    ends = 1 / last_s, 1 / first_s
+    return first_s, last_s
+
+
+def moduli_between(first_s: float, last_s: float, diagnosis: Diagnosis) -> dict[str, list[float]]:
+    """Return moduli of the fit at angular frequencies between the inverses of two times."""
+    experiment, ends = diagnosis.experiment, (1 / last_s, 1 / first_s)
+    assert experiment is not None
     best = np.exp(diagnosis.likelihood.best).tolist()
     values = dict(zip(experiment.searched.names, best, strict=True))
     table = experiment.model.moduli({**experiment.fixed, **values}, np.geomspace(*ends, 31))

@@ -63,7 +63,6 @@ def budget(experiment: Experiment) -> Hashable:
 
 def identify_alike(
     traces: Sequence[Trace],
-    *,
     progress: ReportProgress = silent,
     doing: Callable[[str], None] = lambda step: None,
 ) -> list[Diagnosis]:

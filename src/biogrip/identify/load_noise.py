@@ -9,6 +9,7 @@ deviations and, times a weight, of squared third differences [1]_: it is the mea
 course, given noise and weight, of which the likelihood is highest [2]_. Where rows are rounded
 to steps, they are smoothed as far as what is left scatters no more than errors of rounding. Rows
 that change by far more than most others are no scatter: there one stretch ends and the next begins.
+So it is where another weight becomes better, as where a load gets faster.
 
 What that leaves uncertain are directions, in which the course is off by a random amount each.
 
@@ -21,7 +22,8 @@ References
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -34,13 +36,17 @@ from biogrip.fit.any_sample import fit_responses, spread_lags
 from biogrip.fit.experiment import Experiment
 from biogrip.judging.whiteness import is_still
 from biogrip.physics.modes import lag_course
-from biogrip.physics.noise import ROOT_12, measure_rounding, without
+from biogrip.physics.noise import ROOT_12, estimate_noise, measure_rounding, without
 from biogrip.physics.protocol import with_steps
 from biogrip.traces.reader import Recording
 
-# Weights that are tried; change of a row over the median's that is no scatter; fewest rows.
+# Weights that are tried; change of a row over the median's that is no scatter; fewest rows, of
+# which fewer do not move if they scatter by so many of the sensor's noises.
 _WEIGHTS = 10.0 ** np.arange(-2, 13, 0.5)
-_FAR, _FEWEST = 8.0, 20
+_FAR, _FEWEST, _STILL = 8.0, 20, 2.0
+# Fewest rows of a part of a stretch, how many places are tried to part it, and fall of its
+# cross-validation with which it is; rows on either side of a corner that are not smoothed.
+_PART, _PARTINGS, _BETTER, _BESIDE = 50, 24, 30.0, 3
 # Variance of a direction that is smoothed out, over that of one that is left; most numbers at once.
 _LEFT, _MOST_NUMBERS = 30.0, 20_000_000
 _LAGS_A_DECADE = 2
@@ -74,8 +80,9 @@ def with_its_steps(experiment: Experiment, recording: Recording) -> tuple[Experi
     the smoothed course better.
     """
     assert experiment.record is not None
-    record, uncertain_s = with_steps(experiment.record)
-    step, extent = measure_rounding(experiment.record[:, 1]), np.ptp(experiment.record[:, 1])
+    values = experiment.record[:, 1]
+    step, extent = measure_rounding(values), np.ptp(values)
+    record, uncertain_s = with_steps(experiment.record, noise_sd=estimate_noise(values, 0.0))
     if step and extent > levels.FEWEST_STEPS * step:
         other, other_s = with_steps(experiment.record, levels.ONE_STEP * step)
         smooth = np.column_stack((other[:, 0], smoothed(other[:, 1])[0]))
@@ -146,21 +153,108 @@ def smoothed(values: Array) -> tuple[Array, Array]:
     # A few equal steps are a staircase.
     step = measure_rounding(values) if np.count_nonzero(changes) >= _FEWEST else 0.0
     far = np.maximum(_FAR * np.median(changes), levels.ONE_STEP * step)
-    ends = 1 + np.flatnonzero(changes > far)
+    ends = [0, *(1 + np.flatnonzero(changes > far)).tolist(), len(values)]
+    corners = [first + at for first, last in pairwise(ends) for at in _parted(values[first:last])]
     found, errors = values.copy(), [np.zeros((0, len(values)))]
-    for first, last in pairwise([0, *ends.tolist(), len(values)]):
+    noise_sd = estimate_noise(values, 0.0)
+    for first, last in pairwise(sorted([*ends, *(corners if not step else [])])):
         stretch, beside = values[first:last], ((0, 0), (first, len(values) - last))
-        if is_still(stretch):
+        few = last - first < _FEWEST and np.std(stretch) < _STILL * noise_sd
+        if few or is_still(stretch):
             found[first:last] = np.mean(stretch)
-            errors.append(np.pad(np.full((1, last - first), _error_of_mean(stretch)), beside))
+            scatter = max(float(np.std(stretch)), noise_sd * few)
+            error = np.full((1, last - first), scatter / np.sqrt(last - first))
+            errors.append(np.pad(error, beside))
         elif last - first >= _FEWEST:
             found[first:last], left = _graduated(stretch, step)
             errors.append(np.pad(left, beside))
+    # Beside a corner nothing tells its rows but themselves.
+    beside_corners = np.add.outer(corners, np.arange(-_BESIDE, _BESIDE)).ravel().astype(np.int64)
+    errors.append(noise_sd * np.eye(len(values))[beside_corners])
     return found, np.vstack(errors)
 
 
-def _error_of_mean(values: Array) -> float:
-    return float(np.std(values)) / np.sqrt(len(values))
+@dataclass(frozen=True, eq=False)
+class _Stretch:
+    """Rows of a record that one weight smooths."""
+
+    values: Array
+
+    @cached_property
+    def _bands(self) -> Array:
+        count = len(self.values)
+        bands = np.zeros((_ORDER + 1, count))
+        for row in range(_ORDER + 1):
+            for other in range(row + 1):
+                here = slice(row, count - _ORDER + row)
+                bands[_ORDER - (row - other), here] += _STENCIL[row] * _STENCIL[other]
+        return bands
+
+    @cached_property
+    def roughness(self) -> Array:
+        """Nearly the eigenvalues, but those of a parabola, which are zero."""
+        count = len(self.values)
+        return ((2 - 2 * np.cos(np.pi * np.arange(count) / count)) ** _ORDER)[_ORDER:]
+
+    def smooth_with(self, weight: float, rows: Array | None = None) -> Array:
+        """Return the stretch, or other rows of its length, smoothed with a weight."""
+        # Imported here: few records need it, and loading takes long.
+        from scipy.linalg import solveh_banded
+
+        matrix = weight * self._bands
+        matrix[_ORDER] += 1
+        rows = self.values if rows is None else rows
+        return np.asarray(solveh_banded(matrix, rows, check_finite=False), np.float64)
+
+    def rest(self, weight: float) -> float:
+        """Return the sum of squares that smoothing with a weight leaves, with its roughness."""
+        # Of a record without noise rounding may leave less than nothing.
+        return max(float(self.values @ (self.values - self.smooth_with(weight))), 0.0)
+
+    def deviance(self, weight: float) -> float:
+        """Return the deviance of a weight, of noise of any size [2]_."""
+        rough = weight * self.roughness
+        least = len(rough) * float(np.log(max(self.rest(weight), 1e-300)))
+        return least - float(np.sum(np.log(rough / (1 + rough))))
+
+    def cross_validation(self) -> float:
+        """Return what the likeliest of the weights predicts rows by, comparable with that of parts.
+
+        It is their number times the logarithm of generalized cross-validation.
+        """
+        weight = min(_WEIGHTS[::2], key=self.deviance)
+        count = len(self.values)
+        freedom = _ORDER + float(np.sum(1 / (1 + weight * self.roughness)))
+        left = max(self.rest(weight) / count, 1e-300) / (1 - freedom / count) ** 2
+        return count * float(np.log(left))
+
+
+def _parted(values: Array) -> list[int]:
+    """Return the rows of a stretch, (n,), at which another weight becomes clearly better.
+
+    There a load gets faster, or stands still, with a corner that one weight would round.
+    """
+    thinned = 1 + len(values) // _MOST_READINGS
+    rows = values[::thinned]
+    low, high = _PART, len(rows) - _PART
+
+    if low >= high:
+        return []
+    most = _Stretch(rows).cross_validation() - _BETTER
+    while True:
+        tried = np.unique(np.linspace(low, high, _PARTINGS).astype(np.int64))
+        found = [
+            _Stretch(rows[:at]).cross_validation() + _Stretch(rows[at:]).cross_validation()
+            for at in tried.tolist()
+        ]
+        best = int(np.argmin(found))
+        if found[best] > most:
+            return []
+        low, high = tried[max(best - 1, 0)], tried[min(best + 1, len(tried) - 1)]
+        if tried[-1] - tried[0] < _PARTINGS:
+            break
+    at = int(tried[best]) * thinned
+    return [*_parted(values[:at]), at, *(at + later for later in _parted(values[at:]))]
 
 
 def _graduated(values: Array, step: float) -> tuple[Array, Array]:
@@ -169,43 +263,20 @@ def _graduated(values: Array, step: float) -> tuple[Array, Array]:
     Rows may be rounded to steps: then it has the largest weight with which it leaves no more than
     their errors, of which those of equal neighbours are one.
     """
-    # Imported here: few records need it, and loading takes long.
-    from scipy.linalg import solveh_banded
-
-    count = len(values)
-    bands = np.zeros((_ORDER + 1, count))
-    for row in range(_ORDER + 1):
-        for other in range(row + 1):
-            here = slice(row, count - _ORDER + row)
-            bands[_ORDER - (row - other), here] += _STENCIL[row] * _STENCIL[other]
-    # Nearly the eigenvalues, zero for a parabola.
-    places = np.arange(count)
-    roughness = ((2 - 2 * np.cos(np.pi * places / count)) ** _ORDER)[_ORDER:]
-
-    def smooth_with(weight: float, rows: Array) -> Array:
-        matrix = weight * bands
-        matrix[_ORDER] += 1
-        return np.asarray(solveh_banded(matrix, rows), np.float64)
-
-    def deviance(weight: float) -> float:
-        rest = float(values @ (values - smooth_with(weight, values)))
-        rough = weight * roughness / (1 + weight * roughness)
-        return len(rough) * float(np.log(max(rest, 1e-300))) - float(np.sum(np.log(rough)))
-
+    stretch, count = _Stretch(values), len(values)
     if step:
-        rough = [np.std(values - smooth_with(weight, values)) for weight in _WEIGHTS]
+        rough = [np.std(values - stretch.smooth_with(weight)) for weight in _WEIGHTS]
         weight = _WEIGHTS[max(int(np.searchsorted(rough, step / ROOT_12, side="right")) - 1, 0)]
         equal = count / (1 + np.count_nonzero(np.diff(values)))
         noise = step / ROOT_12 * np.sqrt(equal)
     else:
-        weight = min(_WEIGHTS, key=deviance)
-        # Of a record without noise rounding may leave less than nothing.
-        unexplained = max(float(values @ (values - smooth_with(weight, values))), 0.0)
-        noise = np.sqrt(unexplained / len(roughness))
-    smooth_ones = int(np.count_nonzero(weight * roughness < _LEFT))
+        weight = min(_WEIGHTS, key=stretch.deviance)
+        noise = np.sqrt(stretch.rest(weight) / len(stretch.roughness))
+    smooth_ones = int(np.count_nonzero(weight * stretch.roughness < _LEFT))
     smooth_ones = min(smooth_ones, _MOST_NUMBERS // count)
+    places = np.arange(count)
     waves = np.cos(np.pi * np.outer(places + 0.5, np.arange(1, smooth_ones)) / count)
     basis = np.linalg.qr(np.column_stack((np.vander(places / count, _ORDER), waves)))[0]
-    covariance = basis.T @ smooth_with(weight, basis)
+    covariance = basis.T @ stretch.smooth_with(weight, basis)
     directions = basis @ np.linalg.cholesky(0.5 * (covariance + covariance.T))
-    return smooth_with(weight, values), noise * directions.T
+    return stretch.smooth_with(weight), noise * directions.T

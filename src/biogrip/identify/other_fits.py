@@ -135,9 +135,12 @@ def _tried(own: Sequence[_Own], names: Sequence[str]) -> list[FittedModels]:
         answers = {name: found[name][place] for name in names if place in found[name]}
         posed = {name: problems[name][place] for name in answers}
         if experiment.fit_start and not experiment.coloured:
-            answers = {
+            # No start makes up for what is far more than noise.
+            most = levels.WHITE * min(answer.misfit for answer in answers.values())
+            answers |= {
                 name: _at_own_onset(recording, experiment, name, posed[name], answer)
                 for name, answer in answers.items()
+                if answer.misfit < most
             }
         misfits = _misfits(growths[place], posed, answers)
         tried = ranked([*answers], misfits, fit.problem.residuals.samples)
@@ -153,13 +156,13 @@ def _tried(own: Sequence[_Own], names: Sequence[str]) -> list[FittedModels]:
 def _worth(own: Sequence[_Own], growths: Sequence[Array | None]) -> Worth:
     """Return what tells if a model of so many parameters could have a BIC that is clearly lowest.
 
-    No linear sample fits better than the best of any, see `fit_any_sample`. That is not asked where
-    the config names the models, misfits are weighted or each has a start of its own, nor believed
-    where a model fits better.
+    No linear sample fits better than the best of any, see `fit_any_sample`, at the start that was
+    fitted. That is not asked where the config names the models or misfits are weighted, nor
+    believed where a model fits better.
     """
     least = [
         None
-        if experiment.fit_start or not experiment.usual_models or growth is not None
+        if not experiment.usual_models or growth is not None
         else fit_any_sample(fit.problem.residuals).misfit
         for ((_, experiment), fit, _), growth in zip(own, growths, strict=True)
     ]
@@ -219,7 +222,7 @@ def _misfits(
 def _at_own_onset(
     recording: Recording, experiment: Experiment, name: str, problem: TraceProblem, found: Fit
 ) -> Fit:
-    """Return a model's fit with the onset that it fits best with, from that of the chosen model."""
+    """Return a model's fit with the onset that it fits best with, beside that of the chosen one."""
     if name == experiment.sample.candidate:
         return found
     other = replace(experiment, sample=CANDIDATES[name], fixed={})

@@ -90,8 +90,8 @@ def _with_share(experiment: Experiment, recording: Recording) -> tuple[Experimen
     if np.any(np.abs(shares - share) > levels.SAME_SHARE * share):
         return experiment, recording
     said = (
-        f"Standard deviations are {plain(100 * share, 2)} % of each reading: that is taken of the "
-        "smooth course, as readings that are low by chance would weigh more."
+        f"Standard deviations are {plain(100 * share, 2)} % of each reading. Taken is that share "
+        "of the smooth course: a reading that is low by chance would weigh too much."
     )
     recording = replace(recording, sd=None, remarks_before=(*recording.remarks_before, said))
     return replace(experiment, noise_share=share), recording

@@ -113,7 +113,7 @@ class Diagnosis:
     def moves(self) -> list[Move]:
         """What errors of the instrument do to determined quantities, none of a rejected fit."""
         of = [each.quantity for each in self.findings if each.verdict == DETERMINED]
-        if self.status == REJECTED or not of:
+        if self.status == REJECTED or not of or self.likelihood.problem.residuals.parts:
             return []
         return find_moves(self.likelihood, of, start_fitted=self.onset_limits_s is not None)
 
@@ -140,15 +140,16 @@ def diagnose_all(
     noise of a trace, if its standard deviation is not known, is that of the residual. Limits have a
     confidence, e.g. 0.95.
     """
+    judged = settled(problems, fits, profile_all, confidence=confidence)
+    return [with_notes(diagnosis, find_notes()) for diagnosis, find_notes in judged]
 
-    def profile(likelihoods: Sequence[Likelihood]) -> list[Diagnosis]:
-        model = problems[0].residuals.model
-        every = compute_findings(likelihoods, parameters_and_sum(model))
-        trades = map(find_trade_offs, likelihoods, every)
-        return list(map(profiled, likelihoods, every, trades))
 
-    judged = settled(problems, fits, profile, confidence=confidence)
-    return [_with_notes(diagnosis, find_notes()) for diagnosis, find_notes in judged]
+def profile_all(likelihoods: Sequence[Likelihood]) -> list[Diagnosis]:
+    """Profile all quantities of traces, by one model, and combinations of those not determined."""
+    model = likelihoods[0].problem.residuals.model
+    every = compute_findings(likelihoods, parameters_and_sum(model))
+    trades = map(find_trade_offs, likelihoods, every)
+    return list(map(profiled, likelihoods, every, trades))
 
 
 def settled(
@@ -183,7 +184,7 @@ def settled(
             examined.append(examine_residuals(likelihood))
         likelihoods, finders = zip(*examined, strict=True)
         for trace, judged, find_notes in zip(left, profile(likelihoods), finders, strict=True):
-            lower = _lower_fit(judged, best[trace])
+            lower = lower_fit(judged, best[trace])
             if lower is None:
                 done[trace] = replace(judged, converged=best[trace].converged), find_notes
             else:
@@ -191,9 +192,10 @@ def settled(
     return [done[trace] for trace in range(len(problems))]
 
 
-def _lower_fit(judged: Diagnosis, fit: Fit) -> Fit | None:
+def lower_fit(judged: Diagnosis, fit: Fit) -> Fit | None:
     """Return the fit from the lowest point of the profiles, if it is below the best fit."""
-    if judged.lowest is None:
+    exact = levels.EXACT * judged.likelihood.problem.residuals.peak
+    if judged.lowest is None or fit.misfit < exact:
         return None
     missed = fit.at(fit_from([judged.likelihood.problem], judged.lowest))
     return None if judged.likelihood.increase(missed.misfit) > -levels.MISSED else missed
@@ -208,16 +210,31 @@ def profiled(likelihood: Likelihood, findings: list[Finding], trades: list[Trade
 
 
 def with_times(diagnoses: Sequence[Diagnosis]) -> list[Diagnosis]:
-    """Return diagnoses with findings on relaxation and retardation times after the others."""
+    """Return diagnoses with findings on relaxation and retardation times after the others.
+
+    A sum that holds provided that branches relax within the experiment has no such condition where
+    the limits of their times say so.
+    """
     likelihoods = [diagnosis.likelihood for diagnosis in diagnoses]
     if not (times := characteristic_times(likelihoods[0].problem.residuals.model)):
         return [*diagnoses]
     every = compute_findings(likelihoods, times)
     pairs = zip(diagnoses, every, strict=True)
-    return [replace(diagnosis, findings=[*diagnosis.findings, *more]) for diagnosis, more in pairs]
+    return [
+        replace(own, findings=[*(_unconditional(each, more, own) for each in own.findings), *more])
+        for own, more in pairs
+    ]
 
 
-def _with_notes(judged: Diagnosis, of_rest: list[Note]) -> Diagnosis:
+def _unconditional(finding: Finding, times: Sequence[Finding], judged: Diagnosis) -> Finding:
+    """Return a finding without the conditions that the limits of relaxation times show to hold."""
+    longest_s = judged.likelihood.problem.residuals.duration_s
+    shown = {each.quantity.members[::-1] for each in times if (each.high or np.inf) < longest_s}
+    left = (it for it in finding.quantity.penalties if it.before or it.branch not in shown)
+    return replace(finding, quantity=replace(finding.quantity, penalties=tuple(left)))
+
+
+def with_notes(judged: Diagnosis, of_rest: list[Note]) -> Diagnosis:
     """Return a diagnosis with the force of the jaws, and all notes: those on the rest, too."""
     likelihood, findings = judged.likelihood, judged.findings
     residuals = likelihood.problem.residuals

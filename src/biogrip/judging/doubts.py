@@ -254,8 +254,8 @@ def _misfit(left: _Left, residual: Array, slopes: Array) -> tuple[Note, tuple[fl
     suspects = name_suspects(residuals, times, scale)
     if not residuals.course.sweeps and has_fast_noise(residuals, residual, slopes):
         text = (
-            f"The misfit is {more} times the noise of neighbouring readings, as of noise that is "
-            "correlated for a short time."
+            f"The RMS residual is {more} times the noise of neighbouring readings, as of noise "
+            "that is correlated for a short time."
         )
     elif share < levels.FAR_OFF:
         text = (
@@ -263,7 +263,9 @@ def _misfit(left: _Left, residual: Array, slopes: Array) -> tuple[Note, tuple[fl
             f"noise: {suspects}."
         )
     else:
-        text = f"The misfit is {more} times the noise of the trace, and {of_peak}: {suspects}."
+        text = (
+            f"The RMS residual is {more} times the noise of the trace, and {of_peak}: {suspects}."
+        )
         return Note(REJECTION, text), None
     misfit = whiteness.as_correlated(left.bulk, left.basis)
     if misfit[0] < 1:
@@ -294,7 +296,7 @@ def name_suspects(residuals: Residuals, times: float, scale: float) -> str:
             return f"single readings are far off, as no linear sample leaves less than {noises}"
         return inadequate
     if other * levels.TOO_MUCH < times:
-        return f"{inadequate}; what that leaves is of {culprits}"
+        return f"{inadequate}; the rest comes from {culprits}"
     nearest = f"the nearest leaves {least} times the noise, and that is correlated"
     return f"no linear sample {gives}; {nearest}: {culprits}"
 
@@ -355,8 +357,8 @@ def _about_changes(left: _Left, *, coloured: bool) -> list[str]:
         unit = f" {residuals.instrument.read.unit}".rstrip()
         return [
             f"The readings change at about {plain(0.5 * (before_s + after_s))} s, as by a step of "
-            f"{size}{unit}, which is not white noise ({p_value(step.chance)}): the values may be "
-            "far off. Leave out what is before or after (--from, --until)."
+            f"{size}{unit}: white noise hardly does that ({p_value(step.chance)}), and the values "
+            "may be far off. Leave out what is before or after (--from, --until)."
         ]
     split = middle_of(residuals)
     chance = 1.0 if coloured else whiteness.compare_halves(residual, basis, split)
@@ -397,8 +399,8 @@ def _about_outliers(residuals: Residuals, struck: BoolArray) -> Iterator[str]:
             else ""
         )
         yield (
-            f"{counted(len(far), 'outlier')}, at {named}{more}{of}: further from the "
-            f"fit than noise as that of the other readings is. Outliers distort the fit.{at_step}"
+            f"{counted(len(far), 'outlier')}, at {named}{more}{of}: too far from the fit for the "
+            f"noise of the others. Outliers distort the fit.{at_step}"
         )
 
 

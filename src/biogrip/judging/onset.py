@@ -10,7 +10,7 @@ be another's; it says what a ramp before the first reading would change.
 
 `profile_over_onset` takes the lowest of the profiles for single onsets, each in its increase over
 the best fit with the best onset. Onsets are taken all over their own confidence interval, closer at
-its ends, as on a circle: with nine the limits of an elliptic region are short by at most five per
+its ends, as on a circle: with seven the limits of an elliptic region are short by at most four per
 cent. Linear approximations fail at the kinks.
 """
 
@@ -180,26 +180,27 @@ class OnsetFits:
         """Fit the onset along near that of another fit, whose misfit is never exceeded.
 
         It goes on from interval to interval of `_smooth_intervals`, each from the best values of
-        the one before, until no neighbour has a lower misfit.
+        the one before, until no neighbour that was not tried has a lower misfit.
         """
+        tried = list[tuple[float, float]]()
         for _ in range(_MOST_STEPS):
             ends = [
                 (low_s, min(high_s, self._latest_s))
                 for low_s, high_s in self._smooth_intervals(best.onset_s)
                 if low_s < self._latest_s
             ]
-            found = min((self._within(best, *own) for own in ends), key=lambda fit: fit.misfit)
+            fits = [self._within(best, *own) for own in ends if own not in tried]
+            tried += ends
+            found = min([best, *fits], key=lambda fit: fit.misfit)
             if found.misfit >= best.misfit * (1 - _STILL):
                 return best
-            own, best = next(pair for pair in ends if best.onset_s <= pair[1]), found
-            if own[0] <= best.onset_s <= own[1]:
-                return best
+            best = found
         return best
 
     def _within(self, start: OnsetFit, low_s: float, high_s: float) -> OnsetFit:
         """Fit sample and onset within an interval, from the values of another fit."""
         inside_s = _INSIDE * (high_s - low_s)
-        problem = self.posed(start.onset_s)
+        problem, size = self.posed(start.onset_s), start.misfit or 1.0
         # Imported here: loading it takes longer than a short job.
         from scipy.optimize import least_squares
 
@@ -212,17 +213,18 @@ class OnsetFits:
         )
 
         def of(x: Array) -> Array:
-            return self.posed(x[-1]).residuals.left(x[:-1])
+            return self.posed(x[-1]).residuals.left(x[:-1]) / size
 
         def slopes(x: Array) -> Array:
             residuals, rows = self.posed(x[-1]).residuals(x[:-1])
             aside_s = inside_s if x[-1] < 0.5 * (low_s + high_s) else -inside_s
             moved = self.posed(x[-1] + aside_s).residuals.left(x[:-1]) - residuals
-            return np.vstack((rows, moved / aside_s)).T
+            return np.vstack((rows, moved / aside_s)).T / size
 
         first = np.clip(np.append(start.log_parameters, start.onset_s), low, high)
-        fit = least_squares(of, first, slopes, (low, high), x_scale="jac", max_nfev=_MOST_STEPS)
-        misfit = float(np.sqrt(2 * fit.cost / len(self.time_s)))
+        given = of, first, slopes, (low, high)
+        fit = least_squares(*given, x_scale="jac", ftol=_STILL, max_nfev=_MOST_STEPS)
+        misfit = size * float(np.sqrt(2 * fit.cost / len(self.time_s)))
         return OnsetFit(float(fit.x[-1]), fit.x[:-1], misfit)
 
     def _smooth_intervals(self, onset_s: float) -> Iterator[tuple[float, float]]:
@@ -242,7 +244,7 @@ class OnsetFits:
 _BETWEEN = 5
 # Starts that are compared, the last so much of an interval before the first reading.
 _STARTS, _NEAREST = 40, 0.01
-_SHARES = np.sin(np.pi * np.arange(1, 5) / 10)
+_SHARES = np.sin(np.pi * np.arange(1, 3) / 6)
 # First change of the onset over how far readings are apart there, and most of it as a share of the
 # trace.
 _FIRST_STEP, _MOST = 1 / 64, 0.25
@@ -252,7 +254,7 @@ _EARLIER = 0.1
 # of what moves that is rounding.
 _STEPS_OF_CLOCK, _MOST_ROWS, _TOLD = 3, 3.0, 1e-6
 # Accuracy of an end of the onset's interval, as a share of its distance.
-_ACCURACY = 0.01
+_ACCURACY = 0.02
 
 
 def notes_on_start(
@@ -496,7 +498,8 @@ def profile_over_onset(diagnosis: Diagnosis, time_s: Array) -> Diagnosis:
     every = compute_profiles(others, [finding.quantity for finding in found], smooth=False)
     costs = [best.threshold - each.threshold for each in others]
     by_quantity = zip(*every, strict=True)
-    merged = [_merged(*each, costs) for each in zip(found, by_quantity, strict=True)]
+    at_ends = [_at(best, end_s).best for end_s in ends]
+    merged = [_merged(*each, costs, at_ends) for each in zip(found, by_quantity, strict=True)]
     kept = len(diagnosis.findings)
     pairs = zip(diagnosis.trades, merged[kept:], strict=True)
     trades = [replace(trade, finding=finding) for trade, finding in pairs]
@@ -506,7 +509,7 @@ def profile_over_onset(diagnosis: Diagnosis, time_s: Array) -> Diagnosis:
 def _at(best: Likelihood, change_s: float) -> Likelihood:
     """Return the likelihood of an onset that is later by some s, relative to that of the best."""
     problem = replace(best.problem, residuals=best.problem.residuals.later(change_s))
-    fit = fit_from([problem], best.best)
+    fit = fit_from([problem], best.best, roughly=True)
     misfit = float(fit.misfit[0])
     cost = best.increase(misfit)
     return replace(
@@ -533,8 +536,13 @@ def _end(best: Likelihood, step_s: float) -> float:
     return float(brentq(lambda s: _at(best, s).threshold, inside, outside, xtol=accuracy))
 
 
-def _merged(finding: Finding, profiles: Sequence[Profile], costs: list[float]) -> Finding:
-    """Return a finding with the lowest profile of its own and those of other onsets; no gaps."""
+def _merged(
+    finding: Finding, profiles: Sequence[Profile], costs: list[float], at_ends: list[Array]
+) -> Finding:
+    """Return a finding with the lowest profile of its own and those of other onsets; no gaps.
+
+    At the ends of the onset's interval nothing but their best fits is within the limits.
+    """
     own = finding.profile
     values: Array = np.unique(np.concatenate([p.log_values for p in (own, *profiles)]))
     rows = [
@@ -544,14 +552,15 @@ def _merged(finding: Finding, profiles: Sequence[Profile], costs: list[float]) -
     increases: Array = np.min(rows, axis=0)
     ends = [(profile.low, profile.high) for profile in (own, *profiles)]
     lows, highs = ([end for end in side if end is not None] for side in zip(*ends, strict=True))
+    fitted = [finding.quantity.log(x) for x in at_ends]
     return replace(
         finding,
         profile=replace(
             own,
             log_values=values,
             increases=increases,
-            low=min(lows) if len(lows) == len(ends) else None,
-            high=max(highs) if len(highs) == len(ends) else None,
+            low=min(*lows, *fitted) if len(lows) == len(ends) else None,
+            high=max(*highs, *fitted) if len(highs) == len(ends) else None,
             gaps=(),
         ),
     )

@@ -55,7 +55,12 @@ class Move:
 
 
 def find_mistakes(residuals: Residuals, response: Response) -> Iterator[Mistake]:
-    """Yield the usual errors of an instrument: of zero, gain, clock and steps, or of a phase."""
+    """Yield the usual errors of an instrument: of zero, gain, clock and steps, or of a phase.
+
+    Several traces of one sample have an instrument each: what moves it is told of each.
+    """
+    if residuals.parts:
+        return
     time_s, shown = residuals.trace.time_s, response(residuals)
     read, controlled = (
         channel.name.replace("_", " ")

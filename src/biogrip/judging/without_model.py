@@ -196,7 +196,7 @@ def tell_without_model(
         # It leaves nothing that tells the noise.
         sd = max(sd, residuals.noise_scale)
     is_linear = chance >= levels.CERTAIN_MISFIT or times <= levels.TOO_MUCH
-    if not is_linear:
+    if not is_linear and kinds:
         independent, freedom = as_correlated(*left)
         sd = fit.sd * math.sqrt(free / independent)
     root = partial(_root, confidence, freedom, float(sd / residuals.noise_scale))
@@ -454,7 +454,7 @@ def _quantities(residuals: Residuals, lags: Lags, times: Sequence[float]) -> Ite
         return
     if not deforms:
         for before_s, at_s in pairwise(inside):
-            name = f"J({before_s:g} to {at_s:g} s)"
+            name = f"J({at_s:g} s) - J({before_s:g} s)"
             yield _Functional(name, "increment", at_s, unit, partial(_rise, before_s))
         per_s = inverse_of(viscosity)
         yield _Functional("slope at the end", "slope", last_s, per_s, _ADDED["per second"])

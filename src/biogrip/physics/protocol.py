@@ -276,21 +276,24 @@ _ROWS, _ASIDE = 5, 2
 # Change of the second derivative from row to row, as a share of its size, in smooth rows; second
 # derivative of rows in a line, as a share of that at the end of the line.
 _SMOOTH, _STRAIGHT = 0.25, 0.1
-# Change from row to row that is a step: over those of the rows around, and of the extent.
-_ABRUPT, _STEP_OF_EXTENT = 8.0, 0.01
+# Change from row to row that is a step: over those of the rows around, and of the extent. Change
+# that is noise, over its standard deviation.
+_ABRUPT, _STEP_OF_EXTENT, _OF_NOISE = 8.0, 0.01, 4.0
 
 
-def with_steps(record: Array, least: float = 0.0) -> tuple[Array, Array]:
+def with_steps(record: Array, least: float = 0.0, noise_sd: float = 0.0) -> tuple[Array, Array]:
     """Return a record, (n, 2), with a step in the middle of each two rows between which one came.
 
-    A step is two rows of one time, and not smaller than the least. Also returned are standard
-    deviations of their times in s, (n_steps,), which are anywhere between the rows.
+    A step is two rows of one time, not smaller than the least, and not of the sensor's noise. Also
+    returned are standard deviations of their times in s, (n_steps,), which are anywhere between
+    the rows.
     """
     time_s, values = record.T
     sizes = np.pad(np.abs(np.diff(values)), _ASIDE)
     around = [np.roll(sizes, by) for by in (-2, -1, 1, 2)]
     least = max(least, _STEP_OF_EXTENT * float(np.ptp(values)))
-    abrupt = sizes > np.maximum(_ABRUPT * np.max(around, axis=0), least)
+    usual = np.maximum(np.max(around, axis=0) - _OF_NOISE * noise_sd, noise_sd)
+    abrupt = sizes > np.maximum(_ABRUPT * usual, least)
     before = np.flatnonzero(abrupt[_ASIDE:-_ASIDE])
     middle_s = 0.5 * (time_s[before] + time_s[before + 1])
     steps = np.stack((np.repeat(middle_s, 2), np.ravel(values[before[:, None] + [0, 1]])), axis=1)

@@ -11,7 +11,7 @@ from biogrip.arrays import Array, parts
 from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import Instrument
-from biogrip.physics.modes import compute_modes, linear_responses
+from biogrip.physics.modes import compute_modes, linear_responses, mode_responses
 from biogrip.physics.noise import estimate_noise, measure_rounding
 from biogrip.physics.protocol import Course
 from biogrip.physics.sample_model import Network, SampleModel
@@ -86,6 +86,8 @@ class Residuals:
     """The instrument, for its words."""
     freedom: float = np.inf
     """Degrees of freedom with which the noise model is known."""
+    parts: tuple["Residuals", ...] = ()
+    """Those of each of several traces of one sample (`biogrip.fit.joint`), if it is of several."""
 
     @property
     def samples(self) -> int:
@@ -102,6 +104,11 @@ class Residuals:
         """Time of the last reading, or the longest that a sweep tells of."""
         time_s = self.trace.time_s
         return self.course.spread_s(time_s)[1] if self.course.sweeps else float(time_s[-1])
+
+    @property
+    def covered_s(self) -> tuple[float, float]:
+        """From when to when after a change of what is controlled there are readings."""
+        return self.course.covered_s(self.trace.time_s)
 
     @property
     def noise_scale(self) -> float:
@@ -141,7 +148,7 @@ class Residuals:
 
     def __call__(self, log_parameters: Array) -> tuple[Array, Array]:
         """Return residuals, (n_samples,), and derivatives, (n_parameters, n_samples)."""
-        rows = self._simulated(log_parameters)
+        rows = self.simulated(log_parameters)
         cleared = self.trace.condensed.cleared
         return cleared(rows[0]) - self.trace.cleared, cleared(rows[1:])
 
@@ -152,7 +159,12 @@ class Residuals:
 
     def response(self, log_parameters: Array) -> Array:
         """Return the simulated response, neither cleared nor whitened, (n_samples,)."""
-        return self._simulated(log_parameters)[0]
+        return self.simulated(log_parameters)[0]
+
+    def of_lags(self, rates: Array) -> Array:
+        """Return what lags of rates in 1/s, (n_rates,), show by unit, (n_rates, n_samples)."""
+        shown = mode_responses(-rates[None], self.course, self.trace.time_s)[0]
+        return (1.0 if self.course.deforms else -1.0) * shown
 
     def condensed_responses(self, log_parameters: Array, *, slopes: bool = True) -> Array:
         """Compute rows of responses and, if wanted, their slopes, (n, 1 + n_parameters, n_rows)."""
@@ -200,6 +212,7 @@ class Residuals:
             return None
         return Ring(float(np.max(np.abs(shown))), float(elapsed[latest_first[visible[0]]]))
 
-    def _simulated(self, log_parameters: Array) -> Array:
+    def simulated(self, log_parameters: Array) -> Array:
+        """Return response and derivatives, not cleared, (1 + n_parameters, n_samples)."""
         given = self.gripper, self.model, self.course, self.trace.time_s
         return linear_responses(*given, np.exp(log_parameters[None]))[0]

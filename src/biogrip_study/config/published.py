@@ -30,8 +30,6 @@ class Published(Block):
     """Number of the paper's table."""
     figure: Annotated[int | None, Field(ge=1, le=1000)] = None
     """Number of the paper's figure of the fit."""
-    generation: Annotated[int | None, Field(ge=1, le=1_000_000)] = None
-    """Generation at which the paper shows the fit."""
     axis_rad: Annotated[
         tuple[Annotated[float, Field(ge=-10, le=10)], ...], Field(min_length=2, max_length=2)
     ] = ()

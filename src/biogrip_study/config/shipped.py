@@ -1,14 +1,10 @@
 """Files that come with the study's code: the default config, and the workflow."""
 
-from collections.abc import Mapping
 from pathlib import Path
-
-from biogrip.files import software
 
 # The wheel contains a copy of these files of the repository.
 _PACKAGE = Path(__file__).parents[1]
-_PACKAGED = _PACKAGE / "workflow"
-_TOP = _PACKAGED if _PACKAGED.is_dir() else _PACKAGE.parents[1]
+_TOP = _PACKAGE / "workflow" if (_PACKAGE / "workflow").is_dir() else _PACKAGE.parents[1]
 
 
 def default_config() -> Path:
@@ -24,8 +20,3 @@ def shipped(name: str) -> Path:
 def snakefile() -> Path:
     """Return the workflow that comes with the code, for a workflow of one's own."""
     return shipped("Snakefile")
-
-
-def study_software() -> Mapping[str, str]:
-    """Return versions of what computes the study, and a digest of its source."""
-    return software(_PACKAGE)

@@ -15,6 +15,7 @@ from biogrip.config.loading import load, read_configs, refuse, trace_defaults
 from biogrip.config.messages import checked
 from biogrip.config.source import Source, overlaid, read_source, values_in
 from biogrip.errors import BiogripError
+from biogrip.fit.experiment import Experiment
 from biogrip.keys import Complaint, below, built, plain
 from biogrip.physics.gripper import CombDrive, Gripper
 from biogrip.physics.instruments import GRIPPER
@@ -23,6 +24,7 @@ from biogrip_study.config.case_blocks import OVERRIDABLE, CaseBlock
 from biogrip_study.config.published import UNPUBLISHED, Published
 from biogrip_study.config.shipped import default_config
 from biogrip_study.config.study_blocks import StudyConfig, list_points, point_blocks
+from biogrip_study.gripper.calibration import with_calibration
 from biogrip_study.methods.registry import METHODS, Method
 
 DEFAULTS = trace_defaults(), default_config()
@@ -63,17 +65,19 @@ class Case(SampleCase):
         return self.block.models.target == "nonlinear"
 
     @property
-    def unilateral(self) -> bool:
-        """True if the jaws of the simulation cannot pull the sample."""
-        return self.block.contact == "unilateral"
-
-    @property
     def assumed_gripper(self) -> Gripper:
         """Gripper that identifications assume; a calibration replaces its arms."""
         assumed = self.block.assumed_gripper
         if isinstance(assumed, Mapping):
             return built(Gripper, overlaid(plain(self.gripper), assumed))
         return self.gripper
+
+    @cached_property
+    def experiment(self) -> Experiment:
+        """What was done, for any identification, with the arms of a calibration if there is one."""
+        calibration = self.study.calibrations.get(self.name)
+        experiment = super().experiment
+        return with_calibration(experiment, calibration) if calibration else experiment
 
 
 @dataclass(frozen=True)
@@ -84,6 +88,8 @@ class Study:
     """The whole config, with the study's blocks merged into every case."""
     only: tuple[str, ...] | None = None
     """Names of its cases; by default those of the config."""
+    calibrations: Mapping[str, Path] = field(default_factory=dict)
+    """Files of calibrated grippers, by the names of their cases."""
 
     @cached_property
     def plain(self) -> dict[str, Any]:
@@ -112,7 +118,7 @@ class Study:
 
     def of(self, names: Iterable[str]) -> "Study":
         """Return the study of some of its cases."""
-        return Study(self.config, tuple(names))
+        return replace(self, only=tuple(names))
 
     def _where(self, holds: Callable[[Case], bool]) -> list[str]:
         return [name for name, case in self.cases.items() if holds(case)]
@@ -140,8 +146,8 @@ class Study:
     @property
     def counted(self) -> list[str]:
         """Names of those of which every trace gets the verdicts that users are shown."""
-        covered = self.of(self.covered)
-        return covered._where(lambda case: case.block.identifiability.verdicts_every == 1)
+        cases = ((name, self.cases[name].block.identifiability) for name in self.covered)
+        return [name for name, block in cases if block.verdicts_every == 1]
 
     @property
     def published(self) -> list[str]:
@@ -180,12 +186,6 @@ class Study:
     def shown_method(self) -> Method:
         """Method that tables and figures of a single method show."""
         return METHODS[self.config.methods[0]]
-
-    @property
-    def fitting_method(self) -> Method:
-        """Least squares if the study has it, else the shown method."""
-        has_it = "least_squares" in self.config.methods
-        return METHODS["least_squares"] if has_it else self.shown_method
 
 
 def load_given_study(given: Mapping[str, Any], files: Sequence[Path]) -> Study:

@@ -49,11 +49,6 @@ class ValueBlock(BaseModel):
 
     label: Annotated[Printed, Field(description="Name of the value in print.")]
 
-    @property
-    def changes(self) -> dict[str, float | str]:
-        """Values by their keys."""
-        return self.__pydantic_extra__
-
 
 _Keys = Distinct[Annotated[tuple[str, ...], Field(min_length=1, max_length=100)]]
 _AxisValue = Annotated[_Number | _Text | Annotated[ValueBlock, Tag("a block of keys")], BY_KIND]
@@ -105,7 +100,7 @@ class AxisBlock(Block):
 
     def _level(self, value: float | str | ValueBlock) -> Value:
         if isinstance(value, ValueBlock):
-            inner = dict(sorted(value.changes.items()))
+            inner = dict(sorted((value.model_extra or {}).items()))
             overrides = {f"{key}.{name}": inner[name] for key in self.keys for name in inner}
             return Value("-".join(map(_word, inner.values())), value.label, overrides)
         shown = value if isinstance(value, str) else f"{value / self.unit_in_si:.4g}"

@@ -6,24 +6,42 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from biogrip.arrays import Array
 from biogrip.figures import style
 from biogrip.figures.fit import FittedTrace, draw_fit, fit_of, scale_of
 from biogrip.figures.likelihood import draw_profiles_of
-from biogrip.fit.experiment import Experiment
 from biogrip_study.config.study import Case
 from biogrip_study.gripper.simulation import jaw_force
-from biogrip_study.gripper.unilateral import UnilateralResponse, unilateral_response
+from biogrip_study.gripper.unilateral import unilateral_response
 from biogrip_study.records.identifications import ALL, basins, read_identifications, read_verdicts
 from biogrip_study.records.rows import seeds_of
-from biogrip_study.records.traces import Measurements, read_measurements, read_target
+from biogrip_study.records.traces import read_measurements, read_target
 from biogrip_study.stages.identification import experiment_for
 from biogrip_study.stages.judgement import JUDGED_SEED
 
 SHOWN_SEEDS = 100
 """Most seeds drawn individually; figures show the first ones."""
+
+
+DOTS: dict[str, Any] = {
+    "linestyle": "", "marker": "o", "markersize": 2.2, "markeredgewidth": 0, "alpha": 0.55,
+    "clip_on": False, "in_layout": False,
+}  # fmt: skip
+"""Look of runs; points at the edge would make the layout leave them room."""
+
+
+def draw_runs(
+    axes: Axes, place: float, values: Array, ends: tuple[float, float], color: str
+) -> None:
+    """Draw values of runs, (n,), about a place, and triangles at the edge for those beyond."""
+    # A fixed sideways scatter keeps points apart.
+    sideways = place + 0.6 * ((np.arange(len(values)) * 0.618034) % 1 - 0.5)
+    low, high = (-np.inf, ends[0]), (np.inf, ends[1])
+    points, look = np.column_stack((sideways, values)), DOTS | {"color": color}
+    style.points_within(axes, points, low, high, look, edge_size=3)
 
 
 def first_of_basins(identified: pd.DataFrame, case: Case) -> dict[str, pd.Series]:
@@ -32,12 +50,12 @@ def first_of_basins(identified: pd.DataFrame, case: Case) -> dict[str, pd.Series
         return {"the only trace": identified.iloc[0]}
     return {
         f"seed {runs['seed'].iloc[0]}" + f", {name}" * (name != ALL): runs.iloc[0]
-        for name, runs in basins(identified, case.study.near_noise_tolerance).items()
+        for name, runs in basins(identified, case.study).items()
     }
 
 
 def fits_of_basins(
-    case: Case, identifications: Path, measurements: list[Path], calibrated: list[Path]
+    case: Case, identifications: Path, measurements: list[Path]
 ) -> dict[str, FittedTrace]:
     """Return the fit of the first run of each basin, by label, from files of a case."""
     identified = read_identifications(identifications, case, case.study.shown_method.name)
@@ -46,16 +64,18 @@ def fits_of_basins(
         seed = int(run["seed"])
         values = {p.name: float(run[p.column]) for p in case.sample.model.parameters}
         holding = next(path for path in measurements if seed in seeds_of(path.stem))
-        recorded = read_measurements(holding, [seed])
-        experiment = experiment_for(case.experiment, recorded, calibrated)
-        fits[f"fit ({words})"] = _fit_of_seed(experiment, values, recorded, seed)
+        fits[f"fit ({words})"] = _fit_of_seed(case, seed, values, holding)
     return fits
 
 
 def _fit_of_seed(
-    problem: Experiment, parameters: Mapping[str, float], made: Measurements, seed: int
+    case: Case, seed: int, values: Mapping[str, float], measurements: Path
 ) -> FittedTrace:
-    return fit_of(problem, parameters, made.time_s, made.readings[seed], made.sd, made.target)
+    made = read_measurements(measurements, [seed])
+    experiment = experiment_for(case.experiment, made)
+    return fit_of(
+        experiment, values, made.time_s, made.readings[seed], made.known.get("sd"), made.target
+    )
 
 
 def first_seeds(identified: pd.DataFrame) -> pd.DataFrame:
@@ -70,19 +90,15 @@ def seeds_in_words(count: int) -> str:
     return f"all {count} seeds" if count <= SHOWN_SEEDS else f"first {SHOWN_SEEDS} of {count} seeds"
 
 
-def draw_fits(
-    case: Case, identifications: Path, measurements: list[Path], calibrated: list[Path]
-) -> Figure:
+def draw_fits(case: Case, identifications: Path, measurements: list[Path]) -> Figure:
     """Draw the fit of the first run in each basin, beside the trace of the first of these."""
-    fits = fits_of_basins(case, identifications, measurements, calibrated)
+    fits = fits_of_basins(case, identifications, measurements)
     return draw_fit(fits, case.title, case.published.axis_rad)
 
 
-def draw_judged_fit(
-    case: Case, verdicts: Path, measurements: list[Path], calibrated: list[Path]
-) -> Figure:
+def draw_judged_fit(case: Case, verdicts: Path, measurements: list[Path]) -> Figure:
     """Draw the judged trace of a case and its best fit."""
-    fit = judged_fit(case, read_verdicts(verdicts), measurements[0], calibrated)
+    fit = judged_fit(case, read_verdicts(verdicts), measurements[0])
     trace = "recorded trace" if case.recorded else f"seed {JUDGED_SEED}"
     return draw_fit({f"best fit ({trace})": fit}, case.title, case.published.axis_rad)
 
@@ -93,14 +109,10 @@ def draw_profiles(case: Case, verdicts: Path, expected: list[Path]) -> Figure:
     return draw_profiles_of(read_verdicts(verdicts), others, case.title, case.parameters)
 
 
-def judged_fit(
-    case: Case, verdicts: Mapping[str, Any], measurements: Path, calibrated: list[Path]
-) -> FittedTrace:
+def judged_fit(case: Case, verdicts: Mapping[str, Any], measurements: Path) -> FittedTrace:
     """Return the judged trace of a case and its best fit."""
-    recorded = read_measurements(measurements, [JUDGED_SEED])
-    experiment = experiment_for(case.experiment, recorded, calibrated)
     values = {item["quantity"]: item["value"] for item in verdicts["quantities"]}
-    return _fit_of_seed(experiment, values, recorded, JUDGED_SEED)
+    return _fit_of_seed(case, JUDGED_SEED, values, measurements)
 
 
 def draw_force(case: Case, target: Path) -> Figure:
@@ -109,47 +121,28 @@ def draw_force(case: Case, target: Path) -> Figure:
     device = case.gripper, case.network, case.torque
     # Without inertia, since the jaws ring for less than a sampling interval after a step.
     sticking = jaw_force(*device, time_s, nonlinear=case.nonlinear_target, inertia=False)[0]
-    drawn = style.figure(style.COLUMN_IN, 3.2)
+    drawn = style.figure(style.COLUMN_IN, 3.4)
     forces, rotations = drawn.subplots(2, 1, sharex=True, height_ratios=[1.25, 1])
     factor, unit = scale_of(sticking, "N")
     forces.axhline(0, color=style.BLACK, linewidth=0.6)
     forces.plot(time_s, factor * sticking, color=style.BLUE, label="jaws that hold the sample")
-    negative = np.minimum(factor * sticking, 0)
-    pulling = bool(negative.min() < -1e-9 * factor * np.abs(sticking).max())
-    if pulling:
-        forces.fill_between(
-            time_s, negative, 0, color=style.ORANGE, alpha=0.35, linewidth=0, hatch="////",
-            label="the jaws would have to pull",
-        )  # fmt: skip
-    apart = None
-    if pulling and not case.nonlinear_target:
-        apart = unilateral_response(*device, time_s)
-        shown = _from_loss(apart, apart.jaw_force_N)
-        forces.plot(time_s, factor * shown, "--", color=style.ORANGE, label="jaws that let go")
-    forces.set_ylabel(f"jaw force ({unit})")
-    low, high = float(negative.min()), factor * float(sticking.max())
-    forces.set_ylim(low - 0.08 * (high - low), high + (0.62 if apart else 0.42) * (high - low))
-    forces.legend(loc="upper right")
-    forces.set_title(case.title)
-
-    factor, unit = scale_of(rotation, "rad")
-    name = "target" + (", jaws that let go" if case.unilateral else "")
-    rotations.plot(time_s, factor * rotation, color=style.BLACK, label=name)
-    if apart and not case.unilateral:
-        shown = _from_loss(apart, apart.rotation[0])
-        rotations.plot(time_s, factor * shown, "--", color=style.ORANGE, label="jaws that let go")
-    rotations.set_ylabel(f"rotation ({unit})")
-    low, high = (factor * float(end) for end in (min(rotation.min(), 0), rotation.max()))
-    rotations.set_ylim(low, high + 0.4 * (high - low))
-    rotations.set_xlabel("time (s)")
+    forces.set(ylabel=f"jaw force ({unit})", title=case.title)
+    turn_factor, turn_unit = scale_of(rotation, "rad")
+    name = "target" + (", jaws that let go" if case.block.contact == "unilateral" else "")
+    rotations.plot(time_s, turn_factor * rotation, color=style.BLACK, label=name)
+    rotations.set(ylabel=f"rotation ({turn_unit})", xlabel="time (s)")
     rotations.set_xlim(time_s[0], time_s[-1])
-    rotations.legend(loc="upper right", ncols=2)
-    drawn.align_ylabels()
+    if bool(sticking.min() < -1e-9 * np.abs(sticking).max()):
+        shaded = {"color": style.ORANGE, "alpha": 0.35, "linewidth": 0, "hatch": "////"}
+        pulling = factor * np.minimum(sticking, 0)
+        forces.fill_between(time_s, pulling, 0, label="the jaws would have to pull", **shaded)
+        if not case.nonlinear_target:
+            apart = unilateral_response(*device, time_s)
+            lost = time_s >= apart.changes_s[0]
+            look = {"linestyle": "--", "color": style.ORANGE, "label": "jaws that let go"}
+            forces.plot(time_s[lost], factor * apart.jaw_force_N[lost], **look)
+            if case.block.contact != "unilateral":
+                rotations.plot(time_s[lost], turn_factor * apart.rotation[0][lost], **look)
+    forces.legend()
+    rotations.legend()
     return drawn
-
-
-def _from_loss(response: UnilateralResponse, values: Array) -> Array:
-    """Return values from the last sample before contact is first lost, NaN before."""
-    lost = np.flatnonzero(~response.touching)
-    start = max(lost[0] - 1, 0) if len(lost) else len(values)
-    return np.where(np.arange(len(values)) >= start, values, np.nan)

@@ -9,50 +9,34 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
+import biogrip_study.records.identifications as records
 from biogrip.arrays import Array
 from biogrip.digits import with_unit
 from biogrip.figures import style
 from biogrip.figures.fit import draw_traces
 from biogrip.figures.likelihood import draw_profile
+from biogrip.judging.quantities import parameters_and_sum, quantity_value
 from biogrip.judging.verdicts import BOUNDED_ABOVE
 from biogrip.physics.noise import standard_deviation
-from biogrip.physics.sample_model import Network, SampleModel, complex_modulus
+from biogrip.physics.sample_model import Network, complex_modulus
 from biogrip_study.config.study import Case, Study
-from biogrip_study.figures.case_fit import (
-    SHOWN_SEEDS,
-    first_seeds,
-    fits_of_basins,
-    judged_fit,
-    seeds_in_words,
-)
-from biogrip_study.records.identifications import (
-    near_noise,
-    near_noise_words,
-    read_identifications,
-    read_verdicts,
-)
+from biogrip_study.figures import case_fit
+from biogrip_study.methods.registry import METHODS
 from biogrip_study.records.traces import read_target
 
-# Ends of the axes of identified over target values, of parameters in decades and of sums.
-_WORST, _SUM = 1e3, 0.1
+# End of the axis of identified over target values.
+_WORST = 1e3
 _TITLE_LETTERS = 19
-_DOTS: dict[str, Any] = {
-    "linestyle": "", "marker": "o", "markersize": 2.2, "markeredgewidth": 0, "alpha": 0.55
-}  # fmt: skip
 
 
 def draw_overview(
-    study: Study,
-    identifications: list[Path],
-    expected: list[Path],
-    measurements: list[Path],
-    calibrated: list[Path],
+    study: Study, identifications: list[Path], expected: list[Path], measurements: list[Path]
 ) -> Figure:
     """Draw a fit of each basin of the first case, and identified over target values of some."""
     cases = list(study.cases.values())
     drawn = style.figure(style.PAGE_IN, 3.0)
     axes = drawn.subplots(1, 1 + len(cases), width_ratios=[2] + [1.05] * len(cases))
-    fits = fits_of_basins(cases[0], identifications[0], measurements, calibrated)
+    fits = case_fit.fits_of_basins(cases[0], identifications[0], measurements)
     factor, _ = draw_traces(axes[0], fits)
     fit = next(iter(fits.values()))
     axes[0].set_ylim(top=1.65 * factor * fit.measured.max())
@@ -61,80 +45,67 @@ def draw_overview(
     style.panel(axes[0], "a", cases[0].title)
     files = zip(axes[1:], cases, identifications, expected, strict=True)
     for index, (scatter, case, path, judged) in enumerate(files):
-        identified = read_identifications(path, case, study.shown_method.name)
-        quantities = read_verdicts(judged)["quantities"]
+        identified = records.read_identifications(path, case, study.shown_method.name)
+        quantities = records.read_verdicts(judged)["quantities"]
         bounded = {item["quantity"] for item in quantities if item["verdict"] != BOUNDED_ABOVE}
-        _draw_ratios(scatter, case, first_seeds(identified), bounded)
-        scatter.set_yticks([1e-3, 1e-2, 0.1, 1, 10, 100, 1e3], [""] * 7 if index else None)
+        _draw_ratios(scatter, case, case_fit.first_seeds(identified), bounded)
+        scatter.tick_params(labelleft=index == 0)
         style.panel(scatter, "bcd"[index], case.title, most_letters=_TITLE_LETTERS)
     axes[1].set_ylabel("identified / target")
-    pairs = (zip(*item.get_legend_handles_labels(), strict=True) for item in axes[1:])
-    legend = {label: handle for pair in pairs for handle, label in pair}
     drawn.legend(
-        legend.values(),
-        legend.keys(),
+        *axes[1].get_legend_handles_labels(),
         loc="outside lower right",
         ncols=5,
         markerscale=2.5,
-        title=seeds_in_words(len(identified)) if len(identified) > SHOWN_SEEDS else None,
+        title=case_fit.seeds_in_words(len(identified))
+        if len(identified) > case_fit.SHOWN_SEEDS
+        else None,
     )
     return drawn
 
 
 def _draw_ratios(axes: Axes, case: Case, fits: pd.DataFrame, bounded: set[str]) -> None:
-    reached = near_noise(fits, tolerance := case.study.near_noise_tolerance)
-    identified = case.published.identified
+    """Draw identified over target values of what is determined or bounded below."""
+    reached = records.near_noise(fits, case.study)
+    looks = {
+        f"fit {records.near_noise_words(case.study)}": (reached, style.FITTED),
+        "other fits": (~reached, style.ALL_SEEDS),
+    }
+    for label, (_, color) in looks.items():
+        axes.plot([], [], **case_fit.DOTS | {"color": color}, label=label)
+    axes.plot([], [], "^", color=style.TARGET, markersize=1.6, label="beyond the axis")
+    axes.axhline(1, color=style.TARGET, linewidth=0.8, label="truth")
+    if case.published.identified:
+        axes.plot([], [], color=style.PAPER, label="paper")
     ticks: list[str] = []
-    # Sums are told so much better that on an axis of decades they are a line.
-    sums = axes.twinx()
-    sums.set(ylim=(1 - _SUM, 1 + _SUM))
-    for group in case.sample.model.quantities:
-        names = [parameter.name for parameter in group]
-        target = sum(case.parameters[name] for name in names)
-        if target <= 0 or " + ".join(names) not in bounded:
+    found = records.values_by_quantity(fits, case.sample.model)
+    for quantity in parameters_and_sum(case.sample.model):
+        label, values = quantity.label, found[quantity.label]
+        target = quantity_value(label, case.parameters)
+        if not target or label not in bounded:
             continue
         x = len(ticks)
-        ticks.append("+".join(parameter.symbol for parameter in group))
-        ratio = fits[[parameter.column for parameter in group]].sum(axis=1).to_numpy(float)
-        place = x + 0.5 * ((np.arange(len(ratio)) * 0.618034) % 1 - 0.5)
-        points = np.column_stack([place, ratio / target])
-        target_axes, ends = (
-            (axes, (1 / _WORST, _WORST)) if len(group) == 1 else (sums, (1 - _SUM, 1 + _SUM))
-        )
-        for which, color, label in (
-            (~reached, style.ALL_SEEDS, "other fits"),
-            (reached, style.FITTED, f"fit {near_noise_words(tolerance)}"),
-        ):
-            look, labels = _DOTS | {"color": color}, (label, "")
-            low, high = ((sign * np.inf, end) for sign, end in zip((-1, 1), ends, strict=True))
-            style.points_within(
-                target_axes, points[which], low, high, look, edge_size=3.5, labels=labels
-            )
-        if set(names) <= set(identified):
-            paper = sum(identified[name] for name in names) / target
-            shown = float(np.clip(paper, *ends))
-            target_axes.plot([x - 0.4, x + 0.4], [shown, shown], color=style.PAPER, label="paper")
-    axes.axhline(1, color=style.TARGET, linewidth=0.8, label="truth")
-    axes.set_yscale("log")
-    axes.plot([], [], "^", color=style.TARGET, markersize=1.6, label="beyond the axis")
-    axes.set_ylim(1 / (2 * _WORST), 2 * _WORST)
+        ticks.append(quantity.symbol.replace(" ", ""))
+        ratios = values.to_numpy(float) / target
+        for which, color in reversed(looks.values()):
+            case_fit.draw_runs(axes, x, ratios[which], (1 / _WORST, _WORST), color)
+        if (paper := quantity_value(label, case.published.identified)) is not None:
+            shown = np.clip(paper / target, 1 / _WORST, _WORST)
+            axes.plot([x - 0.4, x + 0.4], [shown, shown], color=style.PAPER)
+    axes.set(yscale="log", ylim=(1 / (2 * _WORST), 2 * _WORST))
     axes.set_xticks(range(len(ticks)), ticks)
-    sums.spines["right"].set_visible(True)
-    sums.set_yticks([1 - _SUM, 1, 1 + _SUM], [f"{1 - _SUM:g}", "1", f"{1 + _SUM:g}"])
-    if len(ticks) > 1:
-        axes.axvline(len(ticks) - 1.5, color=style.TARGET, linewidth=0.5)
 
 
-def draw_answer(study: Study, verdicts: Path, measurements: Path, calibrated: list[Path]) -> Figure:
+def draw_answer(study: Study, verdicts: Path, measurements: Path) -> Figure:
     """Draw a gripper, the judged trace of the only case, and what it tells of two dampers."""
     (case,) = study.cases.values()
-    judged = read_verdicts(verdicts)
+    judged = records.read_verdicts(verdicts)
     items = {item["quantity"]: item for item in judged["quantities"]}
     drawn = style.figure(style.COLUMN_IN, 3.4)
     (device, trace), profiles = drawn.subplots(2, 2)
     _device(device)
     style.panel(device, "1", "two arms squeeze")
-    fit = judged_fit(case, judged, measurements, calibrated)
+    fit = case_fit.judged_fit(case, judged, measurements)
     factor, unit = draw_traces(trace, {"fit": fit})
     trace.set_ylim(top=1.45 * factor * fit.measured.max())
     trace.set(xlabel="time (s)", ylabel=with_unit("rotation", unit))
@@ -169,13 +140,7 @@ NEAR = 0.1
 
 _MODULI_DRAWN = 121
 _PANEL_LETTERS = 28
-_STYLES: tuple[dict[str, Any], ...] = (
-    *({"color": colour} for colour in (style.BLUE, style.ORANGE, style.GREEN)),
-    *(
-        {"color": colour, "linestyle": (0, (2, 2))}
-        for colour in (style.PURPLE, style.SKY, style.GREY)
-    ),
-)
+_COLORS = style.BLUE, style.ORANGE, style.GREEN, style.PURPLE, style.SKY, style.GREY
 
 
 def draw_moduli(study: Study, identifications: list[Path], targets: list[Path]) -> Figure:
@@ -185,20 +150,10 @@ def draw_moduli(study: Study, identifications: list[Path], targets: list[Path]) 
     files = zip(study.cases.values(), identifications, targets, strict=True)
     for column, (case, identified, target) in enumerate(files):
         time_s, _, rotation = read_target(target, case.times_s)
-        logs = case.experiment.logs(case.parameters)
-        _, sensitivity = case.experiment.of(time_s, rotation).residuals(logs)
-        sigma = standard_deviation(rotation, case.noise)
-        # Without noise there is nothing to compare with: NaN.
-        relative = sensitivity / np.where(sigma > 0, sigma, np.nan)
         _draw_moduli_of_case(axes[0, column], study, case, identified, time_s)
-        _sensitivities(axes[1, column], case.experiment.searched, time_s, relative)
+        _draw_sensitivities(axes[1, column], case, time_s, rotation)
         style.panel(axes[0, column], "abc"[column], case.title, _PANEL_LETTERS)
         style.panel(axes[1, column], "def"[column], "when each parameter shows", _PANEL_LETTERS)
-    units = [case.experiment.model.stiffness_unit for case in study.cases.values()]
-    for column, unit in enumerate(units):
-        if column == 0 or unit != units[column - 1]:
-            kind = "stiffness" if unit == "N/m" else "modulus"
-            axes[0, column].set_ylabel(f"{kind} ({unit})")
     axes[1, 0].set_ylabel("sensitivity / noise")
     handles, labels = axes[0, 0].get_legend_handles_labels()
     drawn.legend(handles, labels, loc="outside upper center", ncols=len(labels))
@@ -209,57 +164,58 @@ def _draw_moduli_of_case(
     axes: Axes, study: Study, case: Case, identified: Path, time_s: Array
 ) -> None:
     """Draw G' and G'' of all fits and of the truth, and shade where the fits agree."""
-    between = np.diff(time_s)
-    slowest, fastest = 1 / (time_s[-1] - time_s[0]), 1 / float(np.min(between))
+    slowest, fastest = 1 / (time_s[-1] - time_s[0]), 1 / float(np.min(np.diff(time_s)))
     omega = np.geomspace(slowest / 30, 30 * fastest, _MODULI_DRAWN)
     model = case.experiment.model
     near = []
-    for method in {m.name: m for m in (study.shown_method, study.fitting_method)}.values():
-        runs = first_seeds(read_identifications(identified, case, method.name))
+    # The first method, and least squares if the study has it.
+    names = dict.fromkeys([*study.config.methods[:1], "least_squares"])
+    for method in [METHODS[name] for name in names if name in study.config.methods]:
+        runs = case_fit.first_seeds(records.read_identifications(identified, case, method.name))
         fits = runs[[p.column for p in model.parameters]].to_numpy(float)
         moduli = _modulus(model.network(fits), omega)
-        near.append(moduli[near_noise(runs, study.near_noise_tolerance)])
-        color = style.COLORS[method.color]
-        look: dict[str, Any] = {"color": color, "linewidth": 0.4, "alpha": 0.45}
-        for index, modulus in enumerate(moduli):
-            label = method.title if index == 0 else None
-            for part, dashed in ((modulus.real, "-"), (modulus.imag, "--")):
-                axes.plot(omega, part, dashed, label=label, **look)
-                label = None
+        near.append(moduli[records.near_noise(runs, study)])
+        look: dict[str, Any] = {"color": style.COLORS[method.color], "alpha": 0.45}
+        axes.plot(omega, moduli.real.T, linewidth=0.4, **look)
+        axes.plot(omega, moduli.imag.T, "--", linewidth=0.4, **look)
+        axes.plot([], [], label=method.title, **look)
     fitting = np.concatenate(near)
     # In the upper half and, hatched, in the lower one.
-    for part, above, name in ((fitting.real, 0.5, "storage"), (fitting.imag, 0.0, "loss")):
-        ends: dict[str, Any] = {"ymin": above, "ymax": above + 0.5, "linewidth": 0, "zorder": 0}
-        hatched = {"fill": False, "edgecolor": style.SHADE, "hatch": "////"}
-        ends |= {"color": style.SHADE} if above else hatched
-        shown = np.array([], dtype=np.int64)
-        if len(part):
-            # Where nine tenths of the fits agree.
-            least, most = np.quantile(part, (0.05, 0.95), axis=0)
-            shown = np.flatnonzero(most < (1 + NEAR) * least)
-        for run in np.split(shown, np.flatnonzero(np.diff(shown) > 1) + 1) if len(shown) else []:
-            label = f"{name} seen" if run[0] == shown[0] else None
-            axes.axvspan(omega[run[0]], omega[run[-1]], label=label, **ends)
+    hatched = {"facecolor": "none", "edgecolor": style.SHADE, "hatch": "////"}
+    _shade_agreement(axes, omega, fitting.real, 0.5, label="storage seen", color=style.SHADE)
+    _shade_agreement(axes, omega, fitting.imag, 0.0, label="loss seen", **hatched)
     truth = _modulus(model.sample(case.parameters), omega)[0]
     axes.plot(omega, truth.real, color=style.BLACK, label="truth, storage")
     axes.plot(omega, truth.imag, "--", color=style.BLACK, label="truth, loss")
-    axes.set(xscale="log", yscale="log")
-    largest = float(np.max(np.abs(truth)))
-    axes.set_ylim(1e-5 * largest, 5 * largest)
-    axes.set_xlim(omega[0], omega[-1])
-    axes.set_xlabel("angular frequency (rad/s)")
+    largest, unit = float(np.max(np.abs(truth))), model.stiffness_unit
+    axes.set(xscale="log", yscale="log", ylim=(1e-5 * largest, 5 * largest))
+    axes.set(xlim=(omega[0], omega[-1]), xlabel="angular frequency (rad/s)")
+    axes.set_ylabel(f"{'stiffness' if unit == 'N/m' else 'modulus'} ({unit})")
 
 
-def _sensitivities(axes: Axes, model: SampleModel, time_s: Array, relative: Array) -> None:
-    # Decreasing widths and dashes keep coinciding curves visible.
-    widths = np.linspace(2.2, 1.0, len(model.parameters))
-    for parameter, row, look, width in zip(
-        model.parameters, relative, _STYLES, widths, strict=False
-    ):
-        axes.plot(time_s, row, linewidth=width, label=parameter.symbol, **look)
+def _shade_agreement(axes: Axes, omega: Array, moduli: Array, bottom: float, **look: Any) -> None:
+    """Shade where nine tenths of the fits, (n, n_omega), agree, over half of the height."""
+    if len(moduli):
+        least, most = np.quantile(moduli, (0.05, 0.95), axis=0)
+        look |= {"transform": axes.get_xaxis_transform(), "linewidth": 0, "zorder": 0}
+        axes.fill_between(omega, bottom, bottom + 0.5, where=most < (1 + NEAR) * least, **look)
+
+
+def _draw_sensitivities(axes: Axes, case: Case, time_s: Array, rotation: Array) -> None:
+    """Draw how each parameter changes the response, in standard deviations of the noise."""
+    logs = case.experiment.logs(case.parameters)
+    _, sensitivity = case.experiment.of(time_s, rotation).residuals(logs)
+    sigma = standard_deviation(rotation, case.noise)
+    # Without noise there is nothing to compare with: NaN.
+    relative = sensitivity / np.where(sigma > 0, sigma, np.nan)
+    parameters = case.experiment.searched.parameters
+    # Decreasing widths keep coinciding curves visible.
+    widths = np.linspace(2.2, 1.0, len(parameters))
+    for parameter, row, color, width in zip(parameters, relative, _COLORS, widths, strict=False):
+        axes.plot(time_s, row, linewidth=width, color=color, label=parameter.symbol)
     axes.axhspan(-1, 1, color=style.SHADE, linewidth=0, zorder=0)
     axes.set(xlim=(time_s[0], time_s[-1]), xlabel="time (s)")
-    if not np.any(np.isfinite(relative)):
+    if case.noise.absent:
         axes.text(0.5, 0.5, "no noise", ha="center", transform=axes.transAxes)
     axes.legend(ncols=2, columnspacing=0.8, handlelength=1)
 

@@ -3,7 +3,7 @@
 A calibrated gripper is written as a config block that can be laid over a study.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
@@ -13,72 +13,56 @@ import yaml
 from pydantic import Field
 
 from biogrip.arrays import Array
-from biogrip.digits import counted
 from biogrip.errors import BiogripError
 from biogrip.fit.experiment import Experiment
 from biogrip.keys import Block, Complaint
-from biogrip.physics.gripper import ARM_KEYS, Arm, Gripper
+from biogrip.physics.gripper import ARM_KEYS, Arm
 
 
-@dataclass(frozen=True)
-class CalibratedArm:
-    """A calibrated arm with its standard uncertainties."""
+def calibration_yaml(arms: Mapping[str, Arm], uncertainty: Mapping[str, Arm]) -> str:
+    """Write calibrated arms as a config file that can be laid over a study.
 
-    arm: Arm
-    """Estimates."""
-    uncertainty: Arm
-    """Their standard uncertainties, in the same units."""
-
-
-def calibration_yaml(left: CalibratedArm, right: CalibratedArm) -> str:
-    """Write the calibrated arms as a config file that can be laid over a study."""
-    arms = {"left": left, "right": right}
+    Parameters
+    ----------
+    arms, uncertainty
+        Estimates of the ``left`` and the ``right`` arm, and their standard uncertainties, SI units.
+    """
     block = {
-        **{name: _rounded_arm(arm.arm, 7) for name, arm in arms.items()},
-        "uncertainty": {name: _rounded_arm(arm.uncertainty, 2) for name, arm in arms.items()},
+        **{name: _rounded_arm(arm, 7) for name, arm in arms.items()},
+        "uncertainty": {name: _rounded_arm(arm, 2) for name, arm in uncertainty.items()},
     }
     return yaml.safe_dump({"gripper": block}, sort_keys=False)
-
-
-def with_calibration(experiment: Experiment, files: Sequence[Path]) -> Experiment:
-    """Take the arms of the first calibration file, if any; a bad one is a `BiogripError`."""
-    if not files:
-        return experiment
-    gripper, uncertainty = read_calibrated_arms(files[0], experiment.gripper)
-    return replace(
-        experiment, gripper=gripper, uncertainty={**experiment.uncertainty, **uncertainty}
-    )
-
-
-def read_calibrated_arms(
-    path: Path, gripper: Gripper
-) -> tuple[Gripper, dict[str, dict[str, float]]]:
-    """Return a gripper with the arms of a calibration in place of its own.
-
-    With it come their standard uncertainties, by arm and key. A file that is missing or is no
-    calibration is a `BiogripError`.
-    """
-    try:
-        text = path.read_text(encoding="utf-8")
-        if not text.endswith("\n"):
-            raise ValueError("its end is missing")
-        block = yaml.safe_load(text)["gripper"]
-        left, right = (_numbers_in(block[name]) for name in ("left", "right"))
-        uncertainty = {name: _numbers_in(block["uncertainty"][name]) for name in ("left", "right")}
-    except (OSError, yaml.YAMLError, KeyError, TypeError, ValueError) as error:
-        raise BiogripError(f"{path}: cannot be read as a calibration: {error}.") from error
-    return replace(gripper, left=Arm(**left), right=Arm(**right)), uncertainty
-
-
-def _numbers_in(block: dict[str, float]) -> dict[str, float]:
-    return {key: float(block[key]) for key in ARM_KEYS}
 
 
 def _rounded_arm(arm: Arm, digits: int) -> dict[str, float]:
     return {key: float(f"{getattr(arm, key):.{digits}g}") for key in ARM_KEYS}
 
 
-_FEWEST_SAMPLES_OF_RECORD, _MOST_SAMPLES_OF_RECORD = 64, 10_000_000
+def with_calibration(experiment: Experiment, file: Path) -> Experiment:
+    """Take the arms and their standard uncertainties from a calibration file.
+
+    A file that is missing or is no calibration is a `BiogripError`.
+    """
+    try:
+        text = file.read_text(encoding="utf-8")
+        if not text.endswith("\n"):
+            raise ValueError("its end is missing")
+        block = yaml.safe_load(text)["gripper"]
+        left, right = (Arm(**_numbers_in(block[name])) for name in ("left", "right"))
+        uncertainty = {name: _numbers_in(block["uncertainty"][name]) for name in ("left", "right")}
+    except (OSError, yaml.YAMLError, KeyError, TypeError, ValueError) as error:
+        raise BiogripError(f"{file}: cannot be read as a calibration: {error}.") from error
+    calibrated = replace(experiment.gripper, left=left, right=right)
+    return replace(
+        experiment, gripper=calibrated, uncertainty={**experiment.uncertainty, **uncertainty}
+    )
+
+
+def _numbers_in(block: dict[str, float]) -> dict[str, float]:
+    return {key: float(block[key]) for key in ARM_KEYS}
+
+
+_MOST_SAMPLES_OF_RECORD = 10_000_000
 
 
 @dataclass(frozen=True)
@@ -108,23 +92,25 @@ class CalibrationTest(Block):
             yield ("duration_s",), f"{text}{5 / frequency:.3g} s, to {most:.3g} s."
 
 
-@dataclass(frozen=True)
-class FreeMotion:
-    """Rotation of a free arm after a torque step and after a torque impulse."""
-
-    time_s: Array
-    """Time since step and impulse, (n_samples,)."""
-    step: Array
-    """Rotation after a step, (n_samples,)."""
-    impulse: Array
-    """Rotation after an impulse, (n_samples,)."""
-
-
-def free_motion(arm: Arm, time_s: Array, step_Nm: float, impulse_Nms: float) -> FreeMotion:
+def free_motion(arm: Arm, time_s: Array, step_Nm: float, impulse_Nms: float) -> Array:
     """Solve I phi'' + c phi' + k phi = tau for a step and an impulse, from rest.
 
     With p_1, p_2 the roots of I s^2 + c s + k the impulse turns the arm by
     J (e^(p_1 t) - e^(p_2 t)) / (I (p_1 - p_2)), whether they are real or complex.
+
+    Parameters
+    ----------
+    arm
+        The free arm.
+    time_s
+        Time since step and impulse, (n_samples,).
+    step_Nm, impulse_Nms
+        Height of the torque step in N m, and the torque impulse in N m s.
+
+    Returns
+    -------
+    Array
+        Rotation in rad after the step and after the impulse, (2, n_samples).
     """
     inertia, damping, stiffness = (getattr(arm, key) for key in ARM_KEYS)
     middle = -damping / (2 * inertia)
@@ -136,26 +122,38 @@ def free_motion(arm: Arm, time_s: Array, step_Nm: float, impulse_Nms: float) -> 
     impulse = (slow * apart).real * time_s / inertia
     cosine = 0.5 * (slow + np.exp((middle - half) * time_s)).real
     step = (1 - cosine + middle * inertia * impulse) / stiffness
-    return FreeMotion(time_s, step_Nm * step, impulse_Nms * impulse)
+    return np.stack((step_Nm * step, impulse_Nms * impulse))
 
 
-def calibrate(record: FreeMotion, step_Nm: float, impulse_Nms: float) -> CalibratedArm:
+def calibrate(
+    time_s: Array, measured: Array, step_Nm: float, impulse_Nms: float
+) -> tuple[Arm, Arm]:
     """Identify an arm by least squares on both records, in the logarithms of I, c and k.
 
-    The torque step and impulse caused the motion that was measured. If the arm does not ring within
-    the record, or no arm fits, it is a `BiogripError`.
+    Parameters
+    ----------
+    time_s, measured
+        Times, (n_samples,), and what was measured of `free_motion`, (2, n_samples).
+    step_Nm, impulse_Nms
+        Torque step in N m and impulse in N m s that caused it.
+
+    Returns
+    -------
+    tuple[Arm, Arm]
+        Estimates and their standard uncertainties.
+
+    Raises
+    ------
+    BiogripError
+        If the arm does not follow the step, or no arm fits.
     """
     # Imported here, for settings of calibrations do not need SciPy.
     from scipy.optimize import least_squares
 
-    start = _first_guess(record, step_Nm)
-    measured = np.stack((record.step, record.impulse))
-
     def differences(logarithms: Array) -> Array:
-        motion = free_motion(Arm(*np.exp(logarithms)), record.time_s, step_Nm, impulse_Nms)
-        return np.stack((motion.step, motion.impulse)) - measured
+        return free_motion(Arm(*np.exp(logarithms)), time_s, step_Nm, impulse_Nms) - measured
 
-    scale, logarithms = np.ptp(measured, axis=1), np.log(start)
+    logarithms, scale = np.log(_first_guess(time_s, measured, step_Nm)), np.ptp(measured, axis=1)
     # In the second fit, each record is weighted by its own noise.
     for _ in range(2):
         weights = 1 / scale[:, None]
@@ -167,26 +165,20 @@ def calibrate(record: FreeMotion, step_Nm: float, impulse_Nms: float) -> Calibra
         logarithms = fit.x
         scale = np.maximum(differences(logarithms).std(axis=1), 1e-12 * np.ptp(measured, axis=1))
     variance = np.linalg.inv(fit.jac.T @ fit.jac) * (2 * fit.cost / (len(fit.fun) - 3))
-    values = np.exp(fit.x)
-    return CalibratedArm(Arm(*values), Arm(*(values * np.sqrt(np.diag(variance)))))
+    values = np.exp(logarithms)
+    return Arm(*values), Arm(*(values * np.sqrt(np.diag(variance))))
 
 
-def _first_guess(record: FreeMotion, step_Nm: float) -> Array:
+def _first_guess(time_s: Array, measured: Array, step_Nm: float) -> Array:
     """Estimate stiffness from the step's end, frequency from the spectrum, damping from decay."""
-    if len(record.time_s) < _FEWEST_SAMPLES_OF_RECORD:
-        samples = f"found {counted(len(record.time_s), 'sample')}"
-        raise BiogripError(
-            f"calibration: {samples}, allowed are {_FEWEST_SAMPLES_OF_RECORD} or more."
-        )
-    tail = len(record.time_s) // 4
-    stiffness = step_Nm / np.mean(record.step[-tail:])
+    step, impulse = measured
+    stiffness = step_Nm / np.mean(step[-(len(time_s) // 4) :])
     if not stiffness > 0:
         raise BiogripError("calibration: the arm does not follow the torque step.")
-    interval = record.time_s[1] - record.time_s[0]
-    spectrum = np.abs(np.fft.rfft(record.impulse))
-    peak = int(np.argmax(spectrum[1:])) + 1
-    omega = 2 * np.pi * np.fft.rfftfreq(len(record.time_s), interval)[peak]
-    early, late = (float(np.std(part)) for part in np.array_split(record.impulse, 8)[:2])
-    decay = np.log(max(early / late, 1.01)) / (len(record.time_s) // 8 * interval)
+    interval = time_s[1] - time_s[0]
+    peak = int(np.argmax(np.abs(np.fft.rfft(impulse))[1:])) + 1
+    omega = 2 * np.pi * np.fft.rfftfreq(len(time_s), interval)[peak]
+    early, late = (float(np.std(part)) for part in np.array_split(impulse, 8)[:2])
+    decay = np.log(max(early / late, 1.01)) / (len(time_s) // 8 * interval)
     inertia = stiffness / omega**2
     return np.array([inertia, 2 * inertia * decay, stiffness])

@@ -19,18 +19,21 @@ References
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from biogrip.arrays import Array, IntArray
+from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.errors import BiogripError
 from biogrip.physics.gripper import Arm, Gripper, rotation_of_tip
 from biogrip.physics.protocol import Course, evaluate
 from biogrip.physics.response import LEFT, step_response, superpose, weights_of_loads
 from biogrip.physics.sample_model import Network
 
-_STAGES = 5
+if TYPE_CHECKING:
+    from scipy.interpolate import PPoly
 
+_STAGES = 5
 
 # Length of the first element after a jump of the torque, in s, and the ratio of each element's
 # length to the one before: the error was below 1e-7 of the peak in all tests.
@@ -43,13 +46,11 @@ _LARGEST_CHANGE, _MOST_SWEEPS = 1e-13, 200
 class Correction:
     """Nonlinear minus linear rotation of n samples, as polynomials on a mesh."""
 
-    edges_s: Array
-    """The mesh, (n_elements + 1,)."""
-    values: Array
-    """Rotation at starts of elements and at nodes, (n, n_arms, n_elements, _STAGES + 1)."""
-    force_N: Array
-    """Jaw force there, likewise, (n, n_elements, _STAGES + 1); after a jump, at the start."""
-    converged: np.ndarray
+    rotation: "PPoly"
+    """Of every arm in rad; at times it is (n_times, n, n_arms)."""
+    force: "PPoly"
+    """Jaw force in N, likewise, (n_times, n); after a jump, at the start."""
+    converged: BoolArray
     """True if the sweeps converged, (n,)."""
 
     def checked(self) -> "Correction":
@@ -63,30 +64,12 @@ class Correction:
 
     def at(self, time_s: Array, arm: int = LEFT) -> Array:
         """Evaluate nonlinear minus linear rotation in rad at ascending times, (n, n_times)."""
-        of_arm = self.values[:, min(arm, self.values.shape[1] - 1)]
-        return self._interpolated(of_arm, time_s)
+        of_arms = self.rotation(np.maximum(time_s, 0.0))
+        return np.asarray(of_arms[:, :, min(arm, of_arms.shape[2] - 1)].T)
 
     def force_at(self, time_s: Array) -> Array:
         """Evaluate nonlinear minus linear jaw force in N at ascending times, (n, n_times)."""
-        return self._interpolated(self.force_N, time_s)
-
-    def _interpolated(self, values: Array, time_s: Array) -> Array:
-        edges_s = self.edges_s
-        cuts = np.searchsorted(time_s, edges_s[1:-1], side="left")
-        starts, lengths = (
-            np.repeat(of_elements, np.diff(cuts, prepend=0, append=len(time_s)))
-            for of_elements in (edges_s[:-1], np.diff(edges_s))
-        )
-        points = np.concatenate(([0.0], _radau()[0]))
-        functions = _polynomials(points, (time_s - starts) / lengths)
-        functions[:, time_s < edges_s[0]] = 0.0
-        on_elements = enumerate(np.split(functions, cuts, axis=1))
-        pieces = [
-            values[:, e] @ np.ascontiguousarray(weights)
-            for e, weights in on_elements
-            if weights.size
-        ]
-        return np.concatenate(pieces, axis=1)
+        return np.asarray(np.where(time_s < 0, 0.0, self.force(time_s).T))
 
 
 def nonlinear_rotation(
@@ -148,15 +131,21 @@ def correction(
     values[:, :, 1:, 0] = at_nodes[:, :, :-1, -1]
     held = gripper.left.stiffness_Nm_per_rad * extra + gripper.left.damping_Nms_per_rad * extra_rate
     force = (loads - held)[:, 0] / b_0
-    return Correction(edges, values, _from_starts(force, edges, torque), converged)
+    c = _radau()[0]
+    # After a jump of the torque, no polynomial of the force goes on from the one before.
+    return Correction(
+        _on_mesh(np.append(0.0, c), values, edges), _on_mesh(c, force, edges), converged
+    )
 
 
-def _from_starts(force: Array, edges_s: Array, torque: Course) -> Array:
-    """Complete values at nodes by those at starts, which after a jump are extrapolated."""
-    starts = np.concatenate((force[:, :1, 0], force[:, :-1, -1]), axis=1)
-    sets_in = np.isin(edges_s[:-1], torque.time_s)
-    starts[:, sets_in] = force[:, sets_in] @ _polynomials(_radau()[0], np.zeros(1))[:, 0]
-    return np.concatenate((starts[..., None], force), axis=2)
+def _on_mesh(points: Array, values: Array, edges_s: Array) -> "PPoly":
+    """Return polynomials through values, (..., n_elements, n_points), at points of elements."""
+    # Imported here, for only what is nonlinear needs it.
+    from scipy.interpolate import PPoly
+
+    on_unit_elements = values @ np.linalg.inv(np.vander(points)).T
+    coefficients = on_unit_elements / np.diff(edges_s)[:, None] ** np.arange(len(points))[::-1]
+    return PPoly(np.moveaxis(coefficients, (-1, -2), (0, 1)), edges_s)
 
 
 def _mesh(torque: Course) -> Array:
@@ -193,13 +182,9 @@ class _MeshModes:
     def __init__(self, rates: Array, weights: Array, lengths_s: Array) -> None:
         a, ones = _radau()[1], np.ones(_STAGES)
         z = rates[:, :, None] * lengths_s
-        # (1 - z A)^-1 through the eigenvectors of A: one scalar inverse each.
-        eigenvalues, vectors = np.linalg.eig(a)
-        products = np.einsum("ik,kj->kij", vectors, np.linalg.inv(vectors)).reshape(_STAGES, -1)
-        inverse = (1 / (1 - z[..., None] * eigenvalues)) @ products
-        self._inverse = inverse.real.reshape(*z.shape, _STAGES, _STAGES)
-        self._carry = self._inverse @ ones
-        self._gain = lengths_s[:, None, None] * (self._inverse @ a)
+        inverse = np.linalg.inv(np.eye(_STAGES) - z[..., None, None] * a)
+        self._carry = inverse @ ones
+        self._gain = lengths_s[:, None, None] * (inverse @ a)
         self._rates = rates[:, None, :, None, None]
         self._residues = weights * rates[:, None, None, :]
 
@@ -231,9 +216,3 @@ def _radau() -> tuple[Array, Array]:
     vandermonde = c[:, None] ** powers
     integrals = c[:, None] ** (powers + 1) / (powers + 1)
     return c, integrals @ np.linalg.inv(vandermonde)
-
-
-def _polynomials(points: Array, x: Array) -> Array:
-    """Evaluate the Lagrange polynomials of points at x, (n_points, n)."""
-    of_points, of_x = (np.vander(of, len(points)).T for of in (points, x))
-    return np.asarray(np.linalg.solve(of_points, of_x), np.float64)

@@ -1,4 +1,4 @@
-"""Rotation of the gripper and force on the sample by either model, linear or nonlinear.
+"""Force of the gripper on the sample by either model, linear or nonlinear.
 
 In the nonlinear model F - F_linear = g - (c u' + k u)/b_0^2, with g the load and u the correction
 of `biogrip_study.gripper.nonlinear`, all of second order: no large terms cancel.
@@ -11,20 +11,8 @@ from biogrip.physics.gripper import Gripper
 from biogrip.physics.protocol import Course
 from biogrip.physics.response import linear_jaw_force
 from biogrip.physics.sample_model import Network
-from biogrip.physics.simulation import Grip, extreme_forces, simulated_response
-from biogrip_study.gripper.nonlinear import correction, nonlinear_rotation
-
-
-def target_rotation(
-    gripper: Gripper, network: Network, course: Course, time_s: Array, *, nonlinear: bool
-) -> Array:
-    """Simulate the closing rotation of the left arm in rad, with inertia, (n, n_times).
-
-    By the nonlinear model, corrected eqs. (1)-(3), which has the errors of `nonlinear_rotation`,
-    or the linear one, (4)-(6), at ascending times.
-    """
-    simulate = nonlinear_rotation if nonlinear else simulated_response
-    return simulate(gripper, network, course, time_s)
+from biogrip.physics.simulation import Grip, extreme_forces
+from biogrip_study.gripper.nonlinear import correction
 
 
 def jaw_force(
@@ -38,15 +26,13 @@ def jaw_force(
 ) -> Array:
     """Compute the jaws' force on the sample in N, positive while they press, (n, n_times).
 
-    By either model, as in `target_rotation`; at the instant of a step: what follows it. Without
-    inertia, the force may jump.
+    By either model; at the instant of a step: what follows it. Without inertia, it may jump.
     """
     force = linear_jaw_force(gripper, network, course, time_s, inertia=inertia)
     if nonlinear:
         # Arms with inertia have not moved yet at the instant of a step.
         instants = np.nextafter(time_s, -np.inf) if inertia else time_s
-        more = correction(gripper, network, course).checked().force_at(instants)
-        force += np.where(instants < 0, 0, more)
+        force += correction(gripper, network, course).checked().force_at(instants)
     return force
 
 

@@ -12,21 +12,17 @@ modes q = V^T L^T z of the singular value decomposition G L^-T = U S V^T, and th
 as many digits of the slow rates as by the eigenvalues of its square.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from biogrip.arrays import Array, BoolArray
-from biogrip.errors import BiogripError
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.protocol import Course
 from biogrip.physics.response import phi_functions
 from biogrip.physics.sample_model import Network
 
-_MOST_EVENTS = 100_000
 # Share of the largest force and closing below which a change of contact is rounding.
 _LEAST_CHANGE = 1e-11
 # Time within which a sample without a parallel damper yields, for what is seen at once.
@@ -40,7 +36,7 @@ class UnilateralResponse:
     """Response of gripper and sample with unilateral contact."""
 
     rotation: Array
-    """Closing rotations of the left and the right arm, (2, n_times)."""
+    """Closing rotations of the left and the right arm in rad, (2, n_times)."""
     jaw_force_N: Array
     """Never negative, (n_times,)."""
     touching: BoolArray
@@ -49,19 +45,14 @@ class UnilateralResponse:
     """Shortening of the sample, (n_times,)."""
     dampers_m: Array
     """Shortening of the damper of each Maxwell branch, (n_branches, n_times)."""
-    parted_s: tuple[float, ...]
-    """Times at which contact was lost."""
-    met_s: tuple[float, ...]
-    """Times at which contact was regained."""
+    changes_s: tuple[float, ...]
+    """Times at which contact was lost, regained, lost, ..."""
 
 
 def unilateral_response(
     gripper: Gripper, network: Network, torque: Course, time_s: Array
 ) -> UnilateralResponse:
     """Simulate the first sample in unilateral contact with the jaws, without inertia.
-
-    Phase after phase: solve from the state reached on; find when the margin falls below zero; read
-    the solution up to there; go on from there, with or without contact.
 
     Parameters
     ----------
@@ -70,57 +61,56 @@ def unilateral_response(
     time_s
         Ascending, (n_times,); at the instant of a step: what follows it.
 
-    Raises
-    ------
-    BiogripError
-        If contact is lost too often.
+    Returns
+    -------
+    UnilateralResponse
+        What is seen at these times.
     """
-    system, readings = _System(gripper, network), _Readings(time_s, 3 + network.k.shape[1])
+    state = np.zeros((3 + network.k.shape[1], len(time_s)))
+    force_N, touching = np.zeros(len(time_s)), np.zeros(len(time_s), dtype=bool)
+    changes_s: list[float] = []
+    for stretch in _stretches(gripper, network, torque):
+        if stretch.touching != (len(changes_s) % 2 == 0):
+            changes_s.append(stretch.begin_s)
+        # A reading at its end is also the first of the next, which replaces it.
+        here = (time_s >= stretch.begin_s) & (time_s <= stretch.end_s)
+        elapsed_s = time_s[here] - stretch.begin_s
+        state[:, here], touching[here] = stretch.state(elapsed_s), stretch.touching
+        force_N[here] = stretch.touching * np.maximum(stretch.margin(elapsed_s), 0.0)
+    return UnilateralResponse(state[:2], force_N, touching, state[2], state[3:], tuple(changes_s))
+
+
+@dataclass(frozen=True)
+class _Stretch:
+    """Solution from an instant on, with or without contact, as functions of the time since then."""
+
+    begin_s: float
+    end_s: float
+    touching: bool
+    state: Callable[[Array], Array]
+    """phi_2, phi_4, delta and the branches' dampers, (n_states, n_times)."""
+    margin: Callable[[Array], Array]
+    """Contact force in N, or gap in m, which may not become negative, (n_times,)."""
+
+
+def _stretches(gripper: Gripper, network: Network, torque: Course) -> Iterator[_Stretch]:
+    """Solve phase after phase, each from the state reached on, up to where the margin falls."""
+    systems = {contact: _System(gripper, network, touching=contact) for contact in (True, False)}
     least = _least_changes(gripper, torque)
     touching, state = True, np.zeros(3 + network.k.shape[1])
-    changes_s: dict[bool, list[float]] = {True: [], False: []}
     lengths_s = np.diff(torque.time_s, append=torque.end_s).tolist()
     phases = zip(torque.time_s.tolist(), lengths_s, torque.within_phases, strict=True)
     for start_s, length_s, powers in phases:
         begin_s, in_phase = 0.0, True
         while in_phase:
-            solve = system.in_contact if touching else system.apart
-            stretch = solve(state, _torques_after(powers, begin_s))
-            grid_s = _growing_times(stretch.fastest_per_s, length_s - begin_s)
-            lasts_s = _first_below(stretch.margin, grid_s, least[touching])
-            end_s = length_s if lasts_s is None else begin_s + lasts_s
-            readings.take(stretch, start_s + begin_s, start_s + end_s, touching=touching)
-            over_s = length_s - begin_s if lasts_s is None else lasts_s
-            state = stretch.state(np.array([over_s]))[:, 0]
+            system, left_s = systems[touching], length_s - begin_s
+            solved, margin = system.solve(state, _after(powers, begin_s))
+            lasts_s = _first_below(margin, system.times_within(left_s), least[touching])
             in_phase = lasts_s is not None
-            if in_phase:
-                begin_s = end_s
-                changes_s[touching].append(start_s + begin_s)
-                touching = not touching
-                _check_events(len(changes_s[True]))
-    states, both_s = readings.states, (tuple(changes_s[True]), tuple(changes_s[False]))
-    of_sample = states[2], states[3:]
-    return UnilateralResponse(states[:2], readings.force_N, readings.touching, *of_sample, *both_s)
-
-
-class _Readings:
-    """What is read at times, (n_times,), stretch by stretch."""
-
-    def __init__(self, time_s: Array, n_states: int) -> None:
-        self._time_s = time_s
-        self.states = np.zeros((n_states, len(time_s)))
-        self.force_N, self.touching = np.zeros(len(time_s)), np.zeros(len(time_s), dtype=bool)
-
-    def take(self, stretch: "_Stretch", begin_s: float, end_s: float, *, touching: bool) -> None:
-        """Read a stretch; a reading at its end is also the first of the next, which replaces it."""
-        here = (self._time_s >= begin_s) & (self._time_s <= end_s)
-        elapsed_s = self._time_s[here] - begin_s
-        if not len(elapsed_s):
-            return
-        self.states[:, here] = stretch.state(elapsed_s)
-        self.touching[here] = touching
-        if touching:
-            self.force_N[here] = np.maximum(stretch.margin(elapsed_s), 0.0)
+            end_s = length_s if lasts_s is None else begin_s + lasts_s
+            yield _Stretch(start_s + begin_s, start_s + end_s, touching, solved, margin)
+            state = solved(np.array([left_s if lasts_s is None else lasts_s]))[:, 0]
+            begin_s, touching = end_s, touching != in_phase
 
 
 def _least_changes(gripper: Gripper, torque: Course) -> dict[bool, float]:
@@ -134,142 +124,84 @@ def _least_changes(gripper: Gripper, torque: Course) -> dict[bool, float]:
     return {True: _LEAST_CHANGE * force, False: _LEAST_CHANGE * gap}
 
 
-def _torques_after(powers: Array, elapsed_s: float) -> Array:
-    """Return both arms' torque, (2, 3) as in `_loads`, counted from a time within a phase."""
+def _after(powers: Array, elapsed_s: float) -> Array:
+    """Return value, slope and curvature of a load, (3,), counted from a time within a phase."""
     shift = np.array([[1, 0, 0], [elapsed_s, 1, 0], [elapsed_s**2 / 2, elapsed_s, 1]])
-    return np.stack((powers, powers)) @ shift
-
-
-def _check_events(count: int) -> None:
-    if count > _MOST_EVENTS:
-        raise BiogripError(
-            f"the jaws leave the sample more than {_MOST_EVENTS} times; allowed are protocols with "
-            "fewer phases."
-        )
+    return np.asarray(powers @ shift)
 
 
 def _loads(powers: Array, elapsed_s: Array) -> Array:
-    """Return loads at times, (n_loads, n_times), by value, slope and curvature, (n_loads, 3)."""
+    """Return loads at times, (..., n_times), by value, slope and curvature, (..., 3)."""
     return powers @ np.stack((np.ones_like(elapsed_s), elapsed_s, elapsed_s**2 / 2))
 
 
-class _StretchModes:
-    """Modes of springs G, (n_springs, n_states), and dampers L, (n_states, n_states), lower."""
+class _System:
+    """Equations of motion of gripper and one sample, in contact or apart.
 
-    def __init__(self, springs: Array, dampers: Array) -> None:
-        inverse = np.linalg.inv(dampers)
-        _, sizes, turns = np.linalg.svd(springs @ inverse.T, full_matrices=False)
-        self.rates = sizes**2
-        self._into = turns @ dampers.T
-        self._out = inverse.T @ turns.T
-        self._drive = turns @ inverse
-
-    def follow(self, state: Array, powers: Array) -> Callable[[Array], tuple[Array, Array]]:
-        """Return states and their rates of change, (n_states, n_times), as a function of time.
-
-        They go on from a state, (n_states,), under loads on the first states, see `_loads`.
-        """
-        rates, start = self.rates[:, None], (self._into @ state)[:, None]
-        powers = self._drive[:, : len(powers)] @ powers
-
-        def motion(elapsed_s: Array) -> tuple[Array, Array]:
-            z = -rates * elapsed_s
-            modes: NDArray[Any] = np.exp(z) * start
-            for order in range(3):
-                load = powers[:, order, None]
-                if np.any(load):
-                    phi = phi_functions(order + 1, z)[-1]
-                    modes = modes + load * elapsed_s ** (order + 1) * phi
-            return self._out @ modes, self._out @ (_loads(powers, elapsed_s) - rates * modes)
-
-        return motion
-
-
-class _Stretch(NamedTuple):
-    """Solution from an instant on, with or without contact, as functions of the time since then.
-
-    The state, (n, n_times), is phi_2, phi_4, delta and the branches' dampers. The margin, which may
-    not become negative, is the contact force or the gap.
+    The state is phi_2, phi_4, delta and the branches' dampers. Apart, all of them are coordinates;
+    in contact delta is b (phi_2 + phi_4). L^T is R of a QR decomposition of the dampers' roots.
     """
 
-    state: Callable[[Array], Array]
-    margin: Callable[[Array], Array]
-    fastest_per_s: float
-
-
-class _System:
-    """Equations of motion of gripper and one sample, in contact or apart."""
-
-    def __init__(self, gripper: Gripper, network: Network) -> None:
-        self._b = b = gripper.lever_m
+    def __init__(self, gripper: Gripper, network: Network, *, touching: bool) -> None:
+        self._left, self._b, self._touching = gripper.left, gripper.lever_m, touching
         arms = gripper.left, gripper.right
-        self._c = np.array([arm.damping_Nms_per_rad for arm in arms])
-        self._k = np.array([arm.stiffness_Nm_per_rad for arm in arms])
         k_p, c_p, k, c = network.k_p[0], network.c_p[0], network.k[0], network.c[0]
-        n = len(k)
-        tips = np.array([b, b])
-        spring_rows = np.hstack((np.diag(np.sqrt(self._k)), np.zeros((2, n))))
-        branches = np.sqrt(k)[:, None] * np.hstack((np.tile(tips, (n, 1)), -np.eye(n)))
-        side = np.sqrt(k_p) * np.concatenate((tips, np.zeros(n)))
-        self._touching = _StretchModes(
-            np.vstack((spring_rows, side, branches)),
-            _coupled(self._c, b * b * c_p, np.sqrt(c)),
-        )
-        self._arms = _StretchModes(np.diag(np.sqrt(self._k)), np.diag(np.sqrt(self._c)))
-        # Springs of a sample without a parallel damper are in equilibrium but for so long.
-        c_p = c_p or _AT_ONCE_S * (k_p + k.sum())
-        parallel = np.concatenate(([np.sqrt(k_p)], np.zeros(n)))
-        in_series = np.sqrt(k)[:, None] * np.hstack((np.ones((n, 1)), -np.eye(n)))
-        self._sample = _StretchModes(
-            np.vstack((parallel, in_series)), np.diag(np.sqrt(np.append(c_p, c)))
-        )
+        if not touching:
+            # Springs of a sample without a parallel damper are in equilibrium but for so long.
+            c_p = c_p or _AT_ONCE_S * (k_p + k.sum())
+        springs = np.diag(np.sqrt([*(arm.stiffness_Nm_per_rad for arm in arms), k_p, *k]))
+        springs[3:, 2] = -np.sqrt(k)
+        dampers = np.diag(np.sqrt([*(arm.damping_Nms_per_rad for arm in arms), c_p, *c]))
+        self._whole, self._free = np.eye(len(springs)), [*range(len(springs))]
+        if touching:
+            self._whole[2, :2] = self._b
+            self._free.remove(2)
+        self._whole = self._whole[:, self._free]
+        _, triangle = np.linalg.qr(dampers @ self._whole)
+        self._factor = triangle.T
+        self._inverse = np.linalg.inv(self._factor)
+        _, sizes, self._turns = np.linalg.svd(springs @ self._whole @ self._inverse.T)
+        self._rates = sizes[:, None] ** 2
 
-    def in_contact(self, state: Array, torques: Array) -> _Stretch:
-        """Solve from a state on, in contact."""
-        motion = self._touching.follow(np.delete(state, 2), torques)
+    def solve(
+        self, state: Array, powers: Array
+    ) -> tuple[Callable[[Array], Array], Callable[[Array], Array]]:
+        """Return states and margin as functions of time, from a state, (n_states,), on.
 
-        def states(elapsed_s: Array) -> Array:
-            z, _ = motion(elapsed_s)
-            return np.insert(z, 2, self._b * (z[0] + z[1]), axis=0)
+        Value, slope and curvature of the torque, (3,), are those of both arms.
+        """
+        start = (self._turns @ self._factor.T @ state[self._free])[:, None]
+        drive = self._turns @ self._inverse @ self._whole[:2].sum(axis=0)[:, None] * powers
+        out = self._whole @ self._inverse.T @ self._turns.T
 
-        def force(elapsed_s: Array) -> Array:
-            (phi, *_), (rate, *_) = motion(elapsed_s)
-            held = _loads(torques, elapsed_s)[0] - self._k[0] * phi - self._c[0] * rate
-            return held / self._b
-
-        return _Stretch(states, force, float(self._touching.rates.max()))
-
-    def apart(self, state: Array, torques: Array) -> _Stretch:
-        """Solve from a state on, without contact."""
-        arms = self._arms.follow(state[:2], torques)
-        sample = self._sample.follow(state[2:], np.zeros((0, 3)))
+        def modes_at(elapsed_s: Array) -> Array:
+            z = -self._rates * elapsed_s
+            modes = np.exp(z) * start
+            for order in range(3):
+                phi = phi_functions(order + 1, z)[-1]
+                modes = modes + drive[:, order, None] * elapsed_s ** (order + 1) * phi
+            return modes
 
         def states(elapsed_s: Array) -> Array:
-            return np.vstack((arms(elapsed_s)[0], sample(elapsed_s)[0]))
+            return out @ modes_at(elapsed_s)
 
-        def gap(elapsed_s: Array) -> Array:
-            z = states(elapsed_s)
-            return z[2] - self._b * (z[0] + z[1])
+        def margin(elapsed_s: Array) -> Array:
+            modes = modes_at(elapsed_s)
+            turned, other, shortening = (out @ modes)[:3]
+            if not self._touching:
+                return shortening - self._b * (turned + other)
+            rate = out[0] @ (_loads(drive, elapsed_s) - self._rates * modes)
+            arm = self._left
+            held = arm.stiffness_Nm_per_rad * turned + arm.damping_Nms_per_rad * rate
+            return (_loads(powers, elapsed_s) - held) / self._b
 
-        return _Stretch(states, gap, float(self._arms.rates.max()))
+        return states, margin
 
-
-def _coupled(arms: Array, shared: float, diagonal: Array) -> Array:
-    """Return the Cholesky factor of diag(c_2, c_4) + w (1, 1)(1, 1)^T, and roots beside it."""
-    c_2, c_4 = arms
-    first = np.sqrt(c_2 + shared)
-    second = np.sqrt(c_4 + shared * c_2 / (c_2 + shared))
-    whole = np.diag(np.concatenate(([first, second], diagonal)))
-    whole[1, 0] = shared / first
-    return whole
-
-
-def _growing_times(fastest_per_s: float, length_s: float) -> Array:
-    """Return times from 0 to the end, at growing distances, (n_times,)."""
-    first = min(1e-2 / fastest_per_s, length_s)
-    count = int(np.ceil(np.log(length_s / first) / np.log(_GROWTH_OF_TIMES))) + 1
-    growing = first * _GROWTH_OF_TIMES ** np.arange(count)
-    return np.concatenate(([0.0], growing[growing < length_s], [length_s]), dtype=float)
+    def times_within(self, length_s: float) -> Array:
+        """Return times from 0 to the end, at growing distances, (n_times,)."""
+        first = min(1e-2 / float(self._rates.max()), length_s)
+        count = int(np.ceil(np.log(length_s / first) / np.log(_GROWTH_OF_TIMES))) + 1
+        return np.append(0.0, np.geomspace(first, length_s, max(count, 2)))
 
 
 def _first_below(margin: Callable[[Array], Array], times_s: Array, least: float) -> float | None:

@@ -22,7 +22,7 @@ from pydantic import Field
 from biogrip.arrays import IntArray
 from biogrip.fit.problem import Fit, History, HistoryRow, ReportProgress, TraceProblem, silent
 from biogrip.keys import Block, Complaint
-from biogrip_study.methods.genome import Chromosomes, Genome, make_genome
+from biogrip_study.methods.genome import Chromosomes, Genome
 from biogrip_study.methods.misfit import make_misfits
 
 _LARGEST_SETTING = 1_000_000
@@ -78,7 +78,7 @@ def identify_many(
 ) -> list[Fit]:
     """Identify samples of one model by the paper's genetic algorithm, all at once."""
     misfits = make_misfits([problem.residuals for problem in problems])
-    genome = make_genome(problems[0].ranges)
+    genome = Genome(problems[0].ranges)
 
     def ranked(chromosomes: Chromosomes, populations: IntArray) -> Ranking:
         misfit = misfits(genome.decode(chromosomes), populations).astype(np.float32)
@@ -96,16 +96,14 @@ def identify_many(
     drawn = [genome.draw(settings.population, rng) for rng in rngs]
     # In single bytes, which sorting and crossover copy in half of the time.
     everyone: Chromosomes = np.stack(drawn).astype(np.int8)
-    survivors, ranking = select(everyone, ranked(everyone, running), genome, settings.survivors)
-    improved, stalled = np.zeros_like(running), np.zeros(len(rngs), dtype=bool)
+    survivors, ranking = select(everyone, ranked(everyone, running), settings.survivors)
+    improved = np.zeros_like(running)
     courses: list[list[HistoryRow]] = [[] for _ in rngs]
     evaluations = settings.population
-    evaluations_of_all = evaluations * len(rngs)
     record()
     for generation in range(1, settings.max_generations + 1):
         waited = generation - 1 - improved[running] >= settings.patience
         if generation > settings.min_generations and waited.any():
-            stalled[running[waited]] = True
             running, survivors, ranking = running[~waited], survivors[~waited], ranking[~waited]
             if not len(running):
                 break
@@ -120,30 +118,28 @@ def identify_many(
                 survivors, ranking = survivors[:, :1], ranking[:, :1]
         everyone = np.concatenate((survivors, children), axis=1)
         ranking = np.concatenate((ranking, ranked(children, running)), axis=1)
-        survivors, ranking = select(everyone, ranking, genome, settings.survivors)
+        survivors, ranking = select(everyone, ranking, settings.survivors)
         improved[running[ranking[:, 0] < before]] = generation
         evaluations += children.shape[1]
-        evaluations_of_all += children.shape[1] * len(running)
         record()
-        progress(evaluations_of_all, float(ranking[:, 0].min()))
+        to_come = len(running) * (1 - generation / settings.max_generations)
+        progress(1 - to_come / len(rngs))
     fits = []
-    for course, has_stalled in zip(courses, stalled.tolist(), strict=True):
-        parameters, misfit, _, evaluations = course[-1]
-        why = "stalled" if has_stalled else "generation limit"
-        steps, history = len(course) - 1, History.of(course)
-        fits.append(Fit(parameters, misfit, steps, evaluations, why, history))
+    for course in courses:
+        (parameters, misfit, _, evaluations), generations = course[-1], len(course) - 1
+        why = "stalled" if generations < settings.max_generations else "generation limit"
+        given = parameters, misfit, generations, evaluations, why
+        fits.append(Fit(*given, History.of(course)))
     return fits
 
 
-def select(
-    chromosomes: Chromosomes, ranking: Ranking, genome: Genome, count: int
-) -> tuple[Chromosomes, Ranking]:
+def select(chromosomes: Chromosomes, ranking: Ranking, count: int) -> tuple[Chromosomes, Ranking]:
     """Select the best individuals of each population by their misfits, best first.
 
     Chromosomes are (n_populations, n, n_genes), misfits (n_populations, n). NaN is ranked last. Of
     equals the one with the lowest genes is first.
     """
-    keys: list[NDArray[Any]] = [*genome.keys(chromosomes), ranking]
+    keys: list[NDArray[Any]] = [*np.moveaxis(chromosomes, -1, 0)[::-1], ranking]
     order = np.lexsort(keys)[:, :count]
     return _taken(chromosomes, order), _taken(ranking, order)
 
@@ -197,7 +193,7 @@ def _cuts(
         return np.repeat(ends - genome.sizes + within, genome.sizes, axis=1)
     if settings.cut == "between" and len(ends) > 1:
         return rng.choice(ends[:-1], size=(pairs, 1))
-    last = genome.genes - 1
+    last = len(genome.low) - 1
     return rng.integers(min(1, last), last, size=(pairs, 1), endpoint=True)
 
 
@@ -211,6 +207,6 @@ def mutate(
     for population, rng in zip(chromosomes, rngs, strict=True):
         mutating = np.flatnonzero(rng.random(len(population)) < settings.mutation_probability)
         for _ in range(settings.mutated_genes):
-            gene = rng.integers(genome.genes, size=len(mutating))
+            gene = rng.integers(len(genome.low), size=len(mutating))
             low, high = genome.low[gene], genome.high[gene]
             population[mutating, gene] = rng.integers(low, high, endpoint=True)

@@ -20,76 +20,34 @@ Chromosomes = NDArray[np.integer[Any]]
 class Genome:
     """Encoding of a sample model's parameters as genes."""
 
-    low: IntArray
-    """Smallest value of each gene, included, (n_genes,)."""
-    high: IntArray
-    """Largest one, included, (n_genes,)."""
-    sizes: tuple[int, ...]
-    """Number of genes of each parameter, (n_parameters,): its exponent and digits, in this order,
-    or its bits."""
-    binary: tuple[tuple[int, GeneRange], ...] = ()
-    """Index and range of each parameter that has bits."""
+    ranges: tuple[GeneRange, ...]
+    """Of each parameter, (n_parameters,): its genes are exponent and digits, in this order, or
+    bits."""
 
-    @property
-    def genes(self) -> int:
-        """Length of a chromosome."""
-        return len(self.low)
+    @cached_property
+    def low(self) -> IntArray:
+        """Smallest value of each gene, included, (n_genes,)."""
+        return np.concatenate([genes.bounds[0] for genes in self.ranges])
+
+    @cached_property
+    def high(self) -> IntArray:
+        """Largest one, included, (n_genes,)."""
+        return np.concatenate([genes.bounds[1] for genes in self.ranges])
+
+    @cached_property
+    def sizes(self) -> IntArray:
+        """Number of genes of each parameter, (n_parameters,)."""
+        return np.array([len(genes.bounds[0]) for genes in self.ranges])
 
     def draw(self, count: int, rng: np.random.Generator) -> IntArray:
         """Draw chromosomes uniformly, shape (count, n_genes)."""
-        return rng.integers(self.low, self.high, size=(count, self.genes), endpoint=True)
+        return rng.integers(self.low, self.high, size=(count, len(self.low)), endpoint=True)
 
     def decode(self, chromosomes: Chromosomes) -> Array:
-        """Decode chromosomes into parameters, 10^g_1 (0.1 g_2 + 0.01 g_3 + ...) (eq. 10).
-
-        Of (..., n_genes) they are (..., n_parameters). Each is the double nearest to the encoded
-        decimal number: the digits form an integer, and powers of ten up to 10^22 are exact, so that
-        only one operation rounds.
-        """
-        digits = np.array(self.sizes) - 1
-        powers = chromosomes[..., self._exponents] - digits + _LARGEST_POWER
-        parameters: Array = chromosomes @ self._places
-        parameters *= _TIMES_POWER.take(powers)
-        parameters /= _OVER_POWER.take(powers)
-        for parameter, genes in self.binary:
-            first = self._exponents[parameter]
-            bits = chromosomes[..., first : first + genes.bits]
-            parameters[..., parameter] = _of_bits(genes, bits)
-        return parameters
-
-    def keys(self, chromosomes: Chromosomes) -> list[Array]:
-        """Return numbers that order chromosomes, (..., n_genes), by their first unequal gene.
-
-        The number of the last genes comes first, as for `numpy.lexsort`. There are several where
-        one, a double, would not be exact.
-        """
-        numbers = (chromosomes - self.low.astype(chromosomes.dtype)) @ self._weights
-        return [numbers[..., column] for column in range(numbers.shape[-1])]
-
-    @cached_property
-    def _exponents(self) -> IntArray:
-        """Index of the exponent of each parameter."""
-        return np.cumsum((0, *self.sizes[:-1]))
-
-    @cached_property
-    def _places(self) -> Array:
-        """Place value of each digit in the integer of its parameter, (n_genes, n_parameters)."""
-        places = np.zeros((self.genes, len(self.sizes)))
-        for parameter, (exponent, size) in enumerate(zip(self._exponents, self.sizes, strict=True)):
-            places[exponent + 1 : exponent + size, parameter] = 10.0 ** np.arange(size - 2, -1, -1)
-        return places
-
-    @cached_property
-    def _weights(self) -> Array:
-        """Place value of each gene in the numbers of `keys`, (n_genes, n_numbers)."""
-        columns, weight = [np.zeros(self.genes)], 1
-        for gene in range(self.genes)[::-1]:
-            values = int(self.high[gene] - self.low[gene]) + 1
-            if weight * values > 2**53:
-                columns, weight = [*columns, np.zeros(self.genes)], 1
-            columns[-1][gene] = weight
-            weight *= values
-        return np.stack(columns, axis=1)
+        """Decode chromosomes, (..., n_genes), into parameters, (..., n_parameters)."""
+        parts = np.split(chromosomes, np.cumsum(self.sizes)[:-1], axis=-1)
+        pairs = zip(self.ranges, parts, strict=True)
+        return np.stack([_decoded(genes, part) for genes, part in pairs], axis=-1)
 
 
 # The largest power of ten that is an exact double.
@@ -99,11 +57,18 @@ _TIMES_POWER = np.array([10.0 ** max(power, 0) for power in _POWERS])
 _OVER_POWER = np.array([10.0 ** max(-power, 0) for power in _POWERS])
 
 
-def make_genome(ranges: Sequence[GeneRange]) -> Genome:
-    """Return the genome of parameters, from the gene range of each."""
-    low, high = (np.concatenate(ends) for ends in zip(*(g.bounds for g in ranges), strict=True))
-    sizes = tuple(len(genes.bounds[0]) for genes in ranges)
-    return Genome(low, high, sizes, tuple((i, g) for i, g in enumerate(ranges) if g.bits))
+def _decoded(genes: GeneRange, part: Chromosomes) -> Array:
+    """Decode genes of one parameter, (..., n_genes): 10^g_1 (0.1 g_2 + 0.01 g_3 + ...) (eq. 10).
+
+    It is the double nearest to the encoded decimal number: the digits form an integer, and powers
+    of ten up to 10^22 are exact, so that only one operation rounds. Of bits the largest is first.
+    """
+    if genes.bits:
+        bits = np.bitwise_xor.accumulate(part, axis=-1) if genes.gray else part
+        return encodable_values(genes)[bits @ (1 << np.arange(genes.bits)[::-1])]
+    mantissas = part[..., 1:] @ 10.0 ** np.arange(genes.digits)[::-1]
+    powers = part[..., 0] - genes.digits + _LARGEST_POWER
+    return np.asarray(mantissas * _TIMES_POWER.take(powers) / _OVER_POWER.take(powers))
 
 
 @cache
@@ -111,18 +76,10 @@ def encodable_values(genes: GeneRange) -> Array:
     """Return all positive values that genes can encode, ascending, each the nearest double."""
     if genes.bits:
         return np.geomspace(genes.low, genes.high, 2**genes.bits)
-    mantissas = np.zeros(1)
-    for least, most in zip(genes.least[1:], genes.most[1:], strict=True):
-        mantissas = (10 * mantissas[:, None] + np.arange(least, most + 1)).ravel()
-    powers = np.arange(genes.exponent[0], genes.exponent[1] + 1) - genes.digits + _LARGEST_POWER
-    values: Array = mantissas * _TIMES_POWER[powers, None] / _OVER_POWER[powers, None]
-    return np.unique(values[values > 0]) if genes.least[1] == 0 else values.ravel()
-
-
-def _of_bits(genes: GeneRange, bits: Chromosomes) -> Array:
-    """Decode bits, (..., n_bits), the largest first, into a value each."""
-    plain = np.bitwise_xor.accumulate(bits, axis=-1) if genes.gray else bits
-    return encodable_values(genes)[plain @ (1 << np.arange(genes.bits)[::-1])]
+    every = [np.arange(least, most + 1) for least, most in zip(*genes.bounds, strict=True)]
+    chromosomes = np.stack(np.meshgrid(*every, indexing="ij"), axis=-1)
+    values = _decoded(genes, chromosomes)
+    return np.unique(values[values > 0])
 
 
 def nearest_encodable(value: float, genes: GeneRange) -> float:

@@ -128,48 +128,38 @@ class SeriesMisfit:
         return misfit
 
     def _of_some(self, parameters: Array, traces: IntArray) -> Array:
-        shape = parameters.shape[:2]
         gripper, model, interval_s = self._simulated
         network = model.network(parameters.reshape(-1, parameters.shape[2]))
         static, rates, weights = two_modes(gripper.left, gripper.lever_m, network)
         rates *= interval_s
-        trace = traces.repeat(shape[1])
-        square = self._model_square_sums(static, rates, weights)
-        square += self._square_sums.take(trace)
+        trace = traces.repeat(parameters.shape[1])
         product = static * self._projections_of_constant.take(trace)
         product += _sum_in_order(weights * self.projections(trace, rates))
-        product *= 2
-        square -= product
-        np.maximum(square, 0, out=square)
-        square /= self._samples
-        return np.sqrt(square, out=square).reshape(shape)
+        square = self._model_square_sums(static, rates, weights) + self._square_sums.take(trace)
+        square = np.maximum(square - 2 * product, 0) / self._samples
+        return np.sqrt(square).reshape(parameters.shape[:2])
 
     @cached_property
     def _projections_of_constant(self) -> Array:
         return self.projections(np.arange(len(self._traces)), np.zeros(1))
 
     def _model_square_sums(self, static: Array, rates: Array, weights: Array) -> Array:
-        """Sum squared responses over readings, (n,), as geometric series without cancellation."""
-        decayed = np.expm1(self._lengths * rates)
-        amplitudes = self._amplitudes(weights, 1 + decayed[1:])
+        """Sum squared responses over readings, (n,), as geometric series without cancellation.
+
+        In each phase the response is a constant a_0 plus a_1 z_1^n + a_2 z_2^n; the series of z^n
+        over L readings is (z^L - 1) / (z - 1).
+        """
+        # z - 1 and z^L - 1 of every mode, of its square, and of the product of both.
+        one = np.expm1(self._lengths * rates)
+        two = one * (2 + one)
+        both = one[:, 0] * one[:, 1] + one[:, 0] + one[:, 1]
+        amplitudes = self._amplitudes(weights, 1 + one[1:])
         constants = self._levels * static
-        mixed = decayed[1:] / decayed[0]
-        mixed *= constants
-        both = decayed[:, 0] * decayed[:, 1]
-        both += decayed[:, 0]
-        both += decayed[:, 1]
-        series = both[1:] / both[0]
-        series *= amplitudes[:, 0]
-        mixed[:, 1] += series
-        mixed *= 2
-        decayed *= 2 + decayed
-        terms = decayed[1:] / decayed[0]
-        terms *= amplitudes
-        terms += mixed
-        terms *= amplitudes
-        constants *= constants
-        constants *= self._lengths[1:]
-        return _sum_in_order(_sum_in_order(terms)) + _sum_in_order(constants)[0]
+        mixed = one[1:] / one[0] * constants
+        mixed[:, 1] += both[1:] / both[0] * amplitudes[:, 0]
+        terms = amplitudes * (two[1:] / two[0] * amplitudes + 2 * mixed)
+        squares = constants * constants * self._lengths[1:]
+        return _sum_in_order(_sum_in_order(terms)) + _sum_in_order(squares)[0]
 
     def _amplitudes(self, weights: Array, decays: Array) -> Array:
         """Compute amplitudes of modes at the start of each phase, (n_phases, n_modes, n)."""

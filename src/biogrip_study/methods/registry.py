@@ -8,7 +8,7 @@ progress is told of all. A history has a row for the start and one a step, of wh
 `Fit.generations`.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import import_module
 
@@ -67,23 +67,33 @@ METHODS: dict[str, Method] = {
     )
 }
 
-Identify = Callable[
-    [Sequence[TraceProblem], Sequence[np.random.Generator], ReportProgress], list[Fit]
-]
-"""Identifies traces as the ``identify_many`` of a method does, with its settings."""
 
+def identify_by(
+    name: str,
+    settings: object,
+    problems: Sequence[TraceProblem],
+    rngs: Sequence[np.random.Generator],
+    progress: ReportProgress,
+) -> list[Fit]:
+    """Identify traces by a method of `METHODS`, branches in the order in which they relax.
 
-def identifier(name: str, settings: object) -> Identify:
-    """Load a method of `METHODS` with its settings."""
+    Parameters
+    ----------
+    name
+        Name of the method.
+    settings
+        Config block of the method.
+    problems, rngs
+        Problem of each trace, and its random numbers.
+    progress
+        Told of the share that is done.
+
+    Returns
+    -------
+    list of Fit
+        That of each trace.
+    """
     module = import_module(f"{METHODS[name].package}.{name}")
-
-    def identify(
-        problems: Sequence[TraceProblem],
-        rngs: Sequence[np.random.Generator],
-        progress: ReportProgress,
-    ) -> list[Fit]:
-        fits = module.identify_many(problems, settings, rngs, progress)
-        pairs = zip(problems, fits, strict=True)
-        return [fit.in_order(problem.residuals.model) for problem, fit in pairs]
-
-    return identify
+    fits = module.identify_many(problems, settings, rngs, progress)
+    pairs = zip(problems, fits, strict=True)
+    return [fit.in_order(problem.residuals.model) for problem, fit in pairs]

@@ -4,13 +4,12 @@ from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from biogrip.digits import counted, legible, plain, with_unit
+from biogrip.digits import legible, plain, with_unit
 from biogrip.fit.nested_fits import FittedModel, advice, fits_far_better, preferred
 from biogrip.judging.doubts import DOUBTFUL, OK, REJECTED
-from biogrip.judging.quantities import PROVIDED
 from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
 from biogrip.physics.models import CANDIDATES
-from biogrip_study.records.identifications import ALL, share_with_limits
+from biogrip_study.records.identifications import ALL
 
 TableRow = Mapping[str, str]
 
@@ -28,7 +27,7 @@ def say_what_the_study_gives(
     if not rows:
         return ""
     shares[0] = shares[0].replace("(", f"of {rows[0]['seeds']} runs (95 % interval: ", 1)
-    fit = f"ends within {tolerance:g} of the lowest χ² known that its encoding of values allows"
+    fit = f"finds the best fit that its digits can express (χ² within {tolerance:g})"
     return f"{who} {shown} {fit}, in {_enumerated(shares)}."
 
 
@@ -89,60 +88,30 @@ def say_which_model_is_better(
 _CRITERIA = "aic", "bic"
 _VERBS = {
     DETERMINED: "determines",
-    BOUNDED_BELOW: "bounds only below",
-    BOUNDED_ABOVE: "bounds only above",
+    BOUNDED_BELOW: "bounds from below only",
+    BOUNDED_ABOVE: "bounds from above only",
     NOT_DETERMINED: "tells nothing of",
 }
 
 
-def say_what_traces_tell(coverage: Iterable[TableRow], titles: Mapping[str, str]) -> str:
-    """Say of which quantities all, none, or what share of the traces are determined.
+def rows_of_determined(
+    coverage: Iterable[TableRow], titles: Mapping[str, str]
+) -> list[dict[str, str]]:
+    """Return in how many traces of each sample each quantity is determined, a row a sample.
 
     Rows are those of the table of coverage; only verdicts from whole profiles count.
     """
-    shares: dict[str, list[tuple[str, int, int]]] = defaultdict(list)
+    rows: dict[str, dict[str, str]] = defaultdict(dict)
     for row in coverage:
         if runs := int(row["shown_seeds"] or 0):
-            count = titles[row["case"]], int(row["shown_determined"]), runs
-            shares[row["quantity"]].append(count)
-    if not shares:
-        return ""
-    ends = {q: [share_with_limits(*of) for _, *of in counts] for q, counts in shares.items()}
-    always = [q for q, of in ends.items() if all(low >= 0.9 or at == 1 for at, low, _ in of)]
-    never = [q for q, of in ends.items() if all(high <= 0.1 or at == 0 for at, _, high in of)]
-    runs = max(runs for counts in shares.values() for *_, runs in counts)
-    all_of, none_of = (share_with_limits(count, runs) for count in (runs, 0))
-
-    def determine(share: tuple[float, float, float], names: Sequence[str]) -> str:
-        rounded = round(share[0], 2)
-        if rounded == 0:
-            return f"{'hardly any' if share[0] else 'none'} determines {_enumerated(names)}"
-        nearly = "nearly " * (share[0] < 1)
-        return (
-            f"{nearly + 'all' if rounded == 1 else _percent(*share)} determine {_enumerated(names)}"
-        )
-
-    told = [f"Of {counted(runs, 'trace')} of each sample"]
-    for names, worst in ((always, min), (never, max)):
-        if names:
-            share = worst(of for name in names for of in ends[name])
-            about = {min: "at least ", max: "at most "}[worst] * (0.005 < share[0] < 0.995)
-            provided = f", {PROVIDED}," * any(" + " in name for name in names)
-            told.append(f"{about}{determine(share, names)}{provided}")
-    first = f"{told[0]} {' and '.join(told[1:])}".rstrip(",") + "." if told[1:] else ""
-    of_title: dict[str, dict[tuple[float, float, float], list[str]]]
-    of_title = defaultdict(lambda: defaultdict(list))
-    for name in (name for name in shares if name not in (*always, *never)):
-        for (title, *_), limits in zip(shares[name], ends[name], strict=True):
-            of_title[title][limits].append(name)
-    said = [
-        f"On “{title}” {_enumerated([determine(*of_share) for of_share in by_share.items()])}."
-        for title, by_share in of_title.items()
+            count = int(row["shown_determined"])
+            word = "all" if count == runs else "some" if count else "none"
+            rows[row["case"]][row["quantity"]] = f"{word}: {count} of {runs}"
+    names = dict.fromkeys(name for row in rows.values() for name in row)
+    return [
+        {"sample": titles[case], **{name: row.get(name, "") for name in names}}
+        for case, row in rows.items()
     ]
-    if not first:
-        said[0] = f"{told[0]}, on{said[0].removeprefix('On')}"
-    sure = f"all is {100 * all_of[1]:.0f} to 100 %, none 0 to {100 * none_of[2]:.0f} %"
-    return " ".join(filter(None, [first, *said, legible(f"(95 % intervals: {sure}.)")]))
 
 
 def say_which_method_finds_it(methods: Iterable[TableRow], shown: str) -> str:

@@ -17,13 +17,13 @@ from biogrip.digits import legible, significant, with_unit
 from biogrip.errors import BiogripError
 from biogrip.figures.fit import scale_of
 from biogrip.files import write_text
-from biogrip.judging.quantities import quantity_value
+from biogrip.judging.quantities import PROVIDED, quantity_value
 from biogrip.page.templates import data_url, environment
 from biogrip.physics.noise import rms
 from biogrip.records import read_table, whole
 from biogrip_study.config.study import Case, Study
 from biogrip_study.page import answers
-from biogrip_study.records.identifications import read_verdicts
+from biogrip_study.records.identifications import read_verdicts, share_with_limits
 from biogrip_study.records.traces import read_measurements
 from biogrip_study.stages.judgement import JUDGED_SEED
 
@@ -160,10 +160,14 @@ def _answered(
     recorded = [told for case, told in judged if case.recorded and not study.published]
     asked = methods, study.shown_method.title
     who = "Run again, the paper's" if study.published else "The"
+    runs = max((int(row["shown_seeds"] or 0) for row in coverage), default=0)
     return {
+        "determined": answers.rows_of_determined(coverage, titles),
+        "runs": runs,
+        "none_at_most": share_with_limits(0, runs)[2] if runs else 1.0,
+        "provided": PROVIDED,
         "answers": [
             answers.say_what_recordings_tell(recorded),
-            answers.say_what_traces_tell(coverage, titles),
             answers.say_what_the_study_gives(*asked, titles, who, study.optimum_tolerance),
             answers.say_which_method_finds_it(*asked),
         ],

@@ -19,7 +19,7 @@ from biogrip.fit.experiment import Experiment
 from biogrip.fit.problem import Fit
 from biogrip.physics.sample_model import SINGLE_BRANCH, Parameter, SampleModel
 from biogrip.records import read_object
-from biogrip_study.config.study import Case
+from biogrip_study.config.study import Case, Study
 from biogrip_study.records.rows import RowFile, read_arrays, seeds_of
 
 if TYPE_CHECKING:
@@ -162,19 +162,40 @@ def read_verdicts(path: Path) -> dict[str, Any]:
     return read_object(path, "verdicts")
 
 
+def values_by_quantity(runs: "pd.DataFrame", model: SampleModel) -> "dict[str, pd.Series[float]]":
+    """Return what runs found of every parameter and of the sum of the exchangeable ones, by name.
+
+    Parameters
+    ----------
+    runs
+        Identifications, a row a run.
+    model
+        Sample model, whose parameters have columns.
+
+    Returns
+    -------
+    dict
+        Values in SI units, (n_runs,) each, by the labels of `parameters_and_sum`.
+    """
+    return {
+        " + ".join(p.name for p in group): runs[[p.column for p in group]].sum(axis=1)
+        for group in model.quantities
+    }
+
+
 ALL = "all"
 """Name of the basin of all runs."""
 _LEAST_SHARE_OF_BASIN = 0.1
 """Least share of runs that makes a basin."""
 
 
-def basins(identified: "pd.DataFrame", tolerance: float) -> "dict[str, pd.DataFrame]":
+def basins(identified: "pd.DataFrame", study: Study) -> "dict[str, pd.DataFrame]":
     """Divide the runs of a method on a case into those that end `near_noise` and those above it.
 
     These are two basins, by their names, if a tenth of the runs or more end in each. Else there is
     one, `ALL`, as where the noise is unknown.
     """
-    near = near_noise(identified, tolerance)
+    near = near_noise(identified, study)
     if not _LEAST_SHARE_OF_BASIN <= near.mean() <= 1 - _LEAST_SHARE_OF_BASIN:
         return {ALL: identified}
     return {"near the noise": identified[near], "above the noise": identified[~near]}
@@ -223,17 +244,17 @@ def share_in_words(count: int, runs: int) -> str:
     return f"{share:.0f} % ({low:.0f}–{high:.0f})"
 
 
-def near_noise(identified: "pd.DataFrame", tolerance: float) -> BoolArray:
-    """Return True for each seed whose misfit is at most a share above the RMS noise, (n_seeds,).
+def near_noise(identified: "pd.DataFrame", study: Study) -> BoolArray:
+    """Return True for each seed whose misfit is within the study's tolerance of the noise, (n,).
 
     Such a fit looks right in a plot. With thousands of readings it need not be an optimum:
     a misfit 2 % above the noise increases chi^2 of 4001 readings by 162; see
     `chi_square_increase`.
     """
     misfit, noise = (identified[name].to_numpy(float) for name in ("misfit", "noise_rms"))
-    return misfit <= (1 + tolerance) * noise
+    return misfit <= (1 + study.near_noise_tolerance) * noise
 
 
-def near_noise_words(tolerance: float) -> str:
+def near_noise_words(study: Study) -> str:
     """Describe the criterion of `near_noise` in words."""
-    return f"within {100 * tolerance:g} % of the noise"
+    return f"within {100 * study.near_noise_tolerance:g} % of the noise"

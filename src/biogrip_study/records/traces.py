@@ -1,8 +1,10 @@
 """Files of targets, CSV, and of measurements, npz: traces without and with noise."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +20,16 @@ _TARGET_DIGITS = 9
 _WRITTEN = f"{{:.{_TARGET_DIGITS - 1}e}}"
 
 
+# What else is known of a recorded trace, as `Recording` names it, and how it is read back.
+_OF_RECORDINGS: Mapping[str, Callable[[Any], Any]] = {
+    "sd": np.asarray,
+    "correlation": np.asarray,
+    "sd_known": bool,
+    "onset_s": float,
+    "remarks_before": tuple,
+}
+
+
 @dataclass(frozen=True)
 class Measurements:
     """Noisy traces of one case."""
@@ -28,32 +40,21 @@ class Measurements:
     """Trace without noise, (n_samples,); None for a recorded trace."""
     readings: dict[int, Array]
     """Noisy trace of each seed, (n_samples,) each."""
-    sd: Array | None = None
-    """Standard deviations of the readings, (n_samples,), where they are known."""
-    correlation: Array | None = None
-    """Correlation of the noise of both moduli of a sweep, (n_frequencies,)."""
-    sd_known: bool = True
-    """False if only their ratios are, see `Recording.sd_known`."""
-    onset_s: float | None = None
-    """Time of a recording's clock from which the times count, if it was given or fitted."""
-    remarks: tuple[str, ...] = ()
-    """Sentences on reading a recording."""
+    known: Mapping[str, Any] = field(default_factory=dict)
+    """What else is known of a recorded trace, as `Recording` names it."""
 
     @property
     def recording(self) -> Recording:
         """The only trace, a recorded one."""
         (readings,) = self.readings.values()
-        index = np.arange(len(readings))
-        return Recording(
-            self.time_s,
-            readings,
-            index,
-            sd=self.sd,
-            correlation=self.correlation,
-            sd_known=self.sd_known,
-            onset_s=self.onset_s,
-            remarks_before=self.remarks,
-        )
+        return Recording(self.time_s, readings, np.arange(len(readings)), **self.known)
+
+
+def measurements_of(recording: Recording) -> Measurements:
+    """Return a recorded trace as the only one of its case."""
+    known = {name: getattr(recording, name) for name in _OF_RECORDINGS}
+    known = {name: value for name, value in known.items() if value is not None}
+    return Measurements(recording.time_s, None, {0: recording.readings}, known)
 
 
 def write_target(
@@ -102,16 +103,13 @@ def write_measurements(path: Path, measurements: Measurements) -> None:
     """Write noisy traces as npz: time_s, seeds, traces in their order, and what else is known."""
     arrays = {
         "time_s": measurements.time_s,
-        "target": measurements.target,
-        "sd": measurements.sd,
-        "correlation": measurements.correlation,
-        "sd_known": None if measurements.sd_known else False,
         "seeds": list(measurements.readings),
         "traces": list(measurements.readings.values()),
-        "onset_s": measurements.onset_s,
-        "remarks": measurements.remarks or None,
+        **measurements.known,
     }
-    write_arrays(path, {name: values for name, values in arrays.items() if values is not None})
+    if measurements.target is not None:
+        arrays["target"] = measurements.target
+    write_arrays(path, arrays)
 
 
 def read_measurements(path: Path, seeds: list[int] | None = None) -> Measurements:
@@ -121,14 +119,5 @@ def read_measurements(path: Path, seeds: list[int] | None = None) -> Measurement
     if missing := set(seeds or ()) - set(traces):
         raise BiogripError(f"{path}: has no trace of seed {min(missing)}.")
     chosen = traces if seeds is None else {seed: traces[seed] for seed in seeds}
-    onset_s = arrays.get("onset_s")
-    return Measurements(
-        arrays["time_s"],
-        arrays.get("target"),
-        chosen,
-        sd=arrays.get("sd"),
-        correlation=arrays.get("correlation"),
-        sd_known="sd_known" not in arrays,
-        onset_s=None if onset_s is None else float(onset_s),
-        remarks=tuple(map(str, arrays.get("remarks", ()))),
-    )
+    known = {name: kind(arrays[name]) for name, kind in _OF_RECORDINGS.items() if name in arrays}
+    return Measurements(arrays["time_s"], arrays.get("target"), chosen, known)

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+import biogrip_study.records.identifications as records
 from biogrip.arrays import parts
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.nested_fits import fit_models
@@ -21,17 +22,8 @@ from biogrip.physics.noise import rms, stream
 from biogrip.records import read_table, write_rows
 from biogrip.terminal import Progress
 from biogrip_study.config.study import Case
-from biogrip_study.gripper.calibration import with_calibration
 from biogrip_study.methods.genome import lowest_encodable
-from biogrip_study.methods.registry import identifier
-from biogrip_study.records.identifications import (
-    ENCODABLE,
-    MODEL_FITS,
-    history_of,
-    identification_columns,
-    read_batch,
-    row_of,
-)
+from biogrip_study.methods.registry import identify_by
 from biogrip_study.records.rows import join_arrays, read_arrays, write_arrays
 from biogrip_study.records.traces import Measurements, read_measurements
 
@@ -48,27 +40,27 @@ def identify_seeds(
     method: str,
     seeds: Sequence[int],
     measurements: Path,
-    calibrated: list[Path],
     parameters: Path,
     history: Path,
 ) -> None:
     """Identify a batch of seeds with one method."""
-    identified = identifier(method, case.block.method(method))
+    identified = partial(identify_by, method, case.block.method(method))
     recorded = read_measurements(measurements, list(seeds))
-    experiment = experiment_for(case.experiment, recorded, calibrated).to_identify()
-    progress = Progress(f"{case.name}, {method}", len(seeds))
+    experiment = experiment_for(case.experiment, recorded).to_identify()
+    groups = [*seed_groups(seeds)]
+    progress = Progress(f"{case.name}, {method}", len(groups))
     rows, histories = [], []
-    for group in seed_groups(seeds):
+    for group in groups:
         traces = [recorded.readings[seed] for seed in group]
         rngs = [stream(case.study.config.study_seed, case.name, seed, method) for seed in group]
         problems = experiment.of_each(recorded.time_s, traces)
         answers = identified(problems, rngs, progress.within)
         for seed, trace, answer in zip(group, traces, answers, strict=True):
             noise = None if recorded.target is None else rms(trace - recorded.target)
-            rows.append((case.name, method, seed, *row_of(experiment, answer, noise)))
-            histories.append(history_of(method, seed, experiment, answer))
-        progress.done(len(group))
-    write_rows(parameters, identification_columns(experiment.model), rows)
+            rows.append((case.name, method, seed, *records.row_of(experiment, answer, noise)))
+            histories.append(records.history_of(method, seed, experiment, answer))
+        progress.done()
+    write_rows(parameters, records.identification_columns(experiment.model), rows)
     write_arrays(history, join_arrays(histories))
 
 
@@ -77,7 +69,6 @@ def join(
     batches: list[Path],
     histories: list[Path],
     measurements: list[Path],
-    calibrated: list[Path],
     identifications: Path,
     history: Path,
 ) -> None:
@@ -86,7 +77,7 @@ def join(
     It is looked for around the end of every run, since these surround the continuous optimum.
     """
     for batch in batches:
-        read_batch(batch, case)
+        records.read_batch(batch, case)
     rows = [row for batch in batches for row in read_table(batch)]
     searched = case.experiment.searched.parameters
     ends = defaultdict(list)
@@ -95,28 +86,26 @@ def join(
     lowest: dict[str, str] = {}
     for file in measurements:
         recorded = read_measurements(file)
-        experiment = experiment_for(case.experiment, recorded, calibrated).to_identify()
+        experiment = experiment_for(case.experiment, recorded).to_identify()
         ranges = [experiment.ranges[parameter.range_name] for parameter in searched]
         traces = recorded.readings
         posed = experiment.of_each(recorded.time_s, [*traces.values()])
         for seed, of_trace in zip(map(str, traces), posed, strict=True):
             misfit = lowest_encodable(of_trace.residuals.misfit, ranges, np.array(ends[seed]))
             lowest[seed] = f"{misfit:.6e}"
-    header = identification_columns(case.sample.model)
+    header = records.identification_columns(case.sample.model)
     joined = ([*map(row.get, header), lowest.get(row["seed"], "")] for row in rows)
-    write_rows(identifications, (*header, ENCODABLE), joined)
+    write_rows(identifications, (*header, records.ENCODABLE), joined)
     write_arrays(history, join_arrays([read_arrays(batch) for batch in histories]))
 
 
-def fit(
-    case: Case, seeds: Sequence[int], measurements: Path, calibrated: list[Path], fits: Path
-) -> None:
+def fit(case: Case, seeds: Sequence[int], measurements: Path, fits: Path) -> None:
     """Fit a batch of seeds by least squares with each model."""
     models = {name: sample.model for name, sample in case.models.items()}
     recorded = read_measurements(measurements, list(seeds))
-    experiment = experiment_for(case.experiment, recorded, calibrated).to_identify(*models.values())
+    experiment = experiment_for(case.experiment, recorded).to_identify(*models.values())
     progress = Progress(f"{case.name}, models", len(models) * len(seeds))
-    rows: dict[str, list[tuple[str | int, ...]]] = {name: [] for name in models}
+    rows: list[tuple[str | int, ...]] = []
     for group in seed_groups(seeds):
         traces = experiment.of_each(recorded.time_s, [recorded.readings[seed] for seed in group])
         posed, rngs = {}, {}
@@ -128,20 +117,17 @@ def fit(
         fits_by_model = fit_models(posed, case.block.least_squares, rngs, done)
         for name, answers in fits_by_model.items():
             sizes = len(models[name].names), len(recorded.time_s)
-            rows[name] += [
+            rows += [
                 (case.name, name, seed, *sizes, f"{answer.misfit:.8e}")
                 for seed, answer in zip(group, answers.values(), strict=True)
             ]
-    MODEL_FITS.write(fits, (row for of_model in rows.values() for row in of_model))
+    records.MODEL_FITS.write(fits, rows)
 
 
-def experiment_for(
-    experiment: Experiment, measurements: Measurements, calibrated: Sequence[Path]
-) -> Experiment:
+def experiment_for(experiment: Experiment, measurements: Measurements) -> Experiment:
     """Return the experiment that traces of a case are identified by: see `for_trace`."""
-    experiment = with_calibration(experiment, calibrated)
     if experiment.simulated:
-        return experiment.weighted(measurements.sd)
+        return experiment
     # Imported here: of a simulated trace nothing has to be judged.
     from biogrip.identify.prepare import for_trace
 

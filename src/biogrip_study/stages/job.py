@@ -1,8 +1,8 @@
 """What a job is told: some keys of the config, the seeds of its batch, and its files.
 
 A rule's ``params`` are some keys of the config as plain values, those of its case laid over the
-study's (`settings`). Its script makes a `Case` or a `Study` of these again (`job_case`,
-`job_study`), in which every other key is an error: a rule that forgets to name one fails, and
+study's (`settings`). Its script makes a `Case` or a `Study` of these again (`case_with_keys`,
+`study_of`), in which every other key is an error: a rule that forgets to name one fails, and
 cannot give a result that Snakemake would not renew. Each job has a batch of the case's seeds
 (`batch_names`), calls functions with its files (`arguments`), and writes what it says to its log
 (`logged`).
@@ -49,10 +49,6 @@ class _Named:
 
 # Blocks of which a rule may name single keys.
 _SPLIT = {"measurement": MeasurementBlock, "identifiability": Identifiability}
-_WITH_KEYS = {
-    kind: type(f"_NamedOf{kind.__name__}", (_Named, kind), {})
-    for kind in (StudyConfig, CaseBlock, *_SPLIT.values())
-}
 
 
 def settings(study: Study, keys: Iterable[str], case: str = "") -> dict[str, Any]:
@@ -66,16 +62,15 @@ def settings(study: Study, keys: Iterable[str], case: str = "") -> dict[str, Any
         # What the case leaves at its default is not the study's: it has all of its blocks.
         blocks = {key: value for key, value in blocks.items() if key not in CASE_KEYS}
         blocks |= study.case(case).plain | {"seeds": study.case(case).seeds}
-    blocks = blocks | {
-        "cases": {name: case_of_study.plain for name, case_of_study in study.cases.items()}
-    }
+    blocks = blocks | {"cases": {name: of.plain for name, of in study.cases.items()}}
 
-    def value_of(block: Mapping[str, Any] | None, key: str) -> Any:
-        name, _, inner = key.partition(".")
-        value = (block or {}).get(name)
-        return value_of(value, inner) if inner else value
+    def value_of(key: str) -> Any:
+        value: Any = blocks
+        for name in key.split("."):
+            value = (value or {}).get(name)
+        return value
 
-    return {key: value_of(blocks, key) for key in keys}
+    return {key: value_of(key) for key in keys}
 
 
 def keys_of_cases(study: Study, *keys: str) -> list[str]:
@@ -83,21 +78,25 @@ def keys_of_cases(study: Study, *keys: str) -> list[str]:
     return [f"cases.{name}.{key}" for name in study.cases for key in keys]
 
 
-def case_with_keys(name: str, given: Mapping[str, Any]) -> Case:
-    """Return a case of which some keys are given, by `settings`."""
-    study = Study(_named(StudyConfig, given))
+def case_with_keys(name: str, given: Mapping[str, Any], calibrated: Iterable[Path] = ()) -> Case:
+    """Return a case of which some keys are given, by `settings`, and the file of its gripper."""
+    study = Study(_named(StudyConfig, given), calibrations={file.stem: file for file in calibrated})
     return Case(name, _named(CaseBlock, given), study.config, study=study)
 
 
-def study_of(given: Mapping[str, Any]) -> Study:
-    """Return a study of which, and of whose cases, some keys are given, by `settings`."""
+def study_of(given: Mapping[str, Any], calibrated: Iterable[Path] = ()) -> Study:
+    """Return a study of which, and of whose cases, some keys are given, by `settings`.
+
+    Calibrated grippers are named like their cases.
+    """
     cases: dict[str, dict[str, Any]] = {}
     for key, value in given.items():
         if key.startswith("cases."):
             _, name, inner = key.split(".", 2)
             cases.setdefault(name, {})[inner] = value
     blocks = {name: _named(CaseBlock, keys) for name, keys in cases.items()}
-    return Study(_named(StudyConfig, given, cases=blocks))
+    named = _named(StudyConfig, given, cases=blocks)
+    return Study(named, calibrations={file.stem: file for file in calibrated})
 
 
 def _named(kind: Any, given: Mapping[str, Any], **keys: Any) -> Any:
@@ -113,7 +112,7 @@ def _named(kind: Any, given: Mapping[str, Any], **keys: Any) -> Any:
         elif field.name in given:
             made = field.default_factory
             keys[field.name] = field.default if made is MISSING else made()
-    return _WITH_KEYS[kind](keys)
+    return type(kind.__name__, (_Named, kind), {})(keys)
 
 
 def batch_names(seeds: int, size: int) -> list[str]:
@@ -137,14 +136,9 @@ def logged(job: Any) -> Iterator[None]:
             raise
 
 
-def job_case(job: Any) -> Case:
-    """Return the case of a job, with the keys of the config that its rule names."""
-    return case_with_keys(job.wildcards.case, job_settings(job))
-
-
 def job_study(job: Any) -> Study:
-    """Return the study of a job, with the keys of the config that its rule names."""
-    return study_of(job_settings(job))
+    """Return the study of a job, with the keys and the calibrated grippers that its rule names."""
+    return study_of(job_settings(job), paths(job.input.get("calibrated", [])))
 
 
 def job_settings(job: Any) -> dict[str, Any]:
@@ -172,7 +166,8 @@ def arguments(job: Any, function: Callable[..., object]) -> dict[str, Any]:
     given["seeds"] = [*seeds_of(given.get("batch", "seeds_0-0"))]
     for name, kind in get_type_hints(function).items():
         if kind is Case:
-            given[name] = job_case(job)
+            calibrated = paths(job.input.get("calibrated", []))
+            given[name] = case_with_keys(job.wildcards.case, job_settings(job), calibrated)
         elif kind is Study:
             given[name] = job_study(job)
         elif kind is Path:

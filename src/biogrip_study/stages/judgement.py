@@ -35,7 +35,6 @@ from biogrip.physics.sample_model import SampleModel, with_fixed
 from biogrip.records import write_object
 from biogrip.terminal import Progress
 from biogrip_study.config.study import Case
-from biogrip_study.gripper.calibration import with_calibration
 from biogrip_study.records.identifications import INTERVALS, read_verdicts
 from biogrip_study.records.traces import read_measurements, read_target
 from biogrip_study.stages.identification import experiment_for, seed_groups
@@ -44,22 +43,22 @@ JUDGED_SEED = 0
 """Seed of the trace that is judged."""
 
 
-def judge(case: Case, measurements: Path, calibrated: list[Path], verdicts: Path) -> None:
+def judge(case: Case, measurements: Path, verdicts: Path) -> None:
     """Identify the trace of seed 0, and write verdicts and profiles."""
     recorded = read_measurements(measurements, [JUDGED_SEED])
-    experiment = experiment_for(case.judged_experiment, recorded, calibrated)
+    experiment = experiment_for(case.judged_experiment, recorded)
     (diagnosis,) = identify_alike([(recorded.recording, experiment)])
     assert diagnosis.fit
     _write_diagnosis(verdicts, case, diagnosis, {"noise_model": diagnosis.fit.noise_data()})
 
 
-def expect(case: Case, target: Path, calibrated: list[Path], expected: Path) -> None:
+def expect(case: Case, target: Path, expected: Path) -> None:
     """Write verdicts on the trace without noise, judged with the noise level of the measurement.
 
     They are what to expect of any trace of the case. Without noise, the rounding of the
     target's digits takes its place.
     """
-    experiment = with_calibration(case.experiment.to_identify(), calibrated)
+    experiment = case.experiment.to_identify()
     time_s, _, rotation = read_target(target, case.times_s)
     noise_sd = rms(standard_deviation(rotation, case.noise)) or None
     problem = experiment.of(time_s, rotation, noise_sd=noise_sd)
@@ -93,18 +92,13 @@ _GROUPS_AT_ONCE = 2
 
 
 def estimate_intervals(
-    case: Case,
-    seeds: Sequence[int],
-    target: Path,
-    expected: Path,
-    calibrated: list[Path],
-    intervals: Path,
+    case: Case, seeds: Sequence[int], target: Path, expected: Path, intervals: Path
 ) -> None:
     """Fit a batch of seeds, and compute intervals of what `expected` verdicts call determined.
 
     The noise of a seed is that of its measurement.
     """
-    experiment = with_calibration(case.judged_experiment, calibrated)
+    experiment = case.judged_experiment
     time_s, _, rotation = read_target(target, case.times_s)
     foreseen = read_verdicts(expected)["quantities"]
     determined = {item["quantity"] for item in foreseen if item["verdict"] == DETERMINED}

@@ -6,6 +6,7 @@ the user's file. A calibration identifies the gripper's arms by a test without s
 """
 
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,14 +16,22 @@ from biogrip.errors import BiogripError
 from biogrip.files import write_text
 from biogrip.physics.noise import Noise, add_noise, stream
 from biogrip.physics.protocol import evaluate, sample_times
+from biogrip.physics.simulation import simulated_response
 from biogrip.terminal import warn
 from biogrip.traces.columns import place
 from biogrip_study.config.study import Case
-from biogrip_study.gripper.calibration import FreeMotion, calibrate, calibration_yaml, free_motion
-from biogrip_study.gripper.simulation import jaw_force, target_grip, target_rotation
+from biogrip_study.gripper.calibration import calibrate, calibration_yaml, free_motion
+from biogrip_study.gripper.nonlinear import nonlinear_rotation
+from biogrip_study.gripper.simulation import jaw_force, target_grip
 from biogrip_study.gripper.unilateral import unilateral_response
 from biogrip_study.records.rows import write_arrays
-from biogrip_study.records.traces import Measurements, read_target, write_measurements, write_target
+from biogrip_study.records.traces import (
+    Measurements,
+    measurements_of,
+    read_target,
+    write_measurements,
+    write_target,
+)
 
 
 def simulate_target(case: Case, target: Path) -> None:
@@ -32,7 +41,9 @@ def simulate_target(case: Case, target: Path) -> None:
     """
     time_s = case.times_s
     read, force = response(case, time_s)
-    _check_finite(case, time_s, read)
+    if not np.all(np.isfinite(read)):
+        text = f"the simulated {case.instrument.read.name} is not finite; allowed are parameters, "
+        raise BiogripError(f"{text}a gripper and a protocol for which it is.")
     if case.instrument.has_jaws:
         largest = float(np.max(np.abs(read)))
         if largest > case.stroke:
@@ -47,24 +58,14 @@ def simulate_target(case: Case, target: Path) -> None:
 def response(case: Case, time_s: Array) -> tuple[Array, Array | None]:
     """Return what is read and, if there are jaws, their force, (n_samples,) each."""
     device, nonlinear = (case.gripper, case.network, case.torque), case.nonlinear_target
-    if case.unilateral:
+    if case.block.contact == "unilateral":
         apart = unilateral_response(*device, time_s)
         return apart.rotation[0], apart.jaw_force_N
-    read = target_rotation(*device, time_s, nonlinear=nonlinear)[0]
+    simulate = nonlinear_rotation if nonlinear else simulated_response
+    read = simulate(*device, time_s)[0]
     if not case.instrument.has_jaws:
         return read, None
     return read, jaw_force(*device, time_s, nonlinear=nonlinear)[0]
-
-
-def _check_finite(case: Case, time_s: Array, simulated: Array) -> None:
-    model, read = case.sample.model, case.instrument.read.name
-    for sample in np.flatnonzero(~np.isfinite(simulated))[:1]:
-        values = ", ".join(f"{name} = {case.parameters[name]:g}" for name in model.names)
-        raise BiogripError(
-            f"the simulated {read} of {model.title} with {values} is {simulated[sample]} "
-            f"at {time_s[sample]:g} s; allowed are parameters, a gripper and a protocol for which "
-            "it is finite."
-        )
 
 
 def _warn_if_contact_is_lost(case: Case) -> None:
@@ -72,7 +73,7 @@ def _warn_if_contact_is_lost(case: Case) -> None:
     grip = target_grip(*device, nonlinear=case.nonlinear_target)
     if words := grip.words():
         then = "without adhesion contact is lost there (contact: unilateral simulates that)"
-        if case.unilateral:
+        if case.block.contact == "unilateral":
             then = "contact is lost there, which its identification ignores"
         warn(f"{case.name}: under this protocol {words}; {then}.")
 
@@ -91,17 +92,15 @@ def calibrate_gripper(case: Case, gripper: Path, records: Path) -> None:
     time_s = sample_times(test.duration_s, test.rate_Hz)
     noise = Noise("gaussian", test.noise_level, "peak")
     causes = test.step_torque_Nm, test.impulse_Nms
-    columns, arms = {"time_s": time_s}, {}
+    columns, arms, uncertainty = {"time_s": time_s}, {}, {}
     for name in ("left", "right"):
-        motion = free_motion(getattr(case.gripper, name), time_s, *causes)
         rng = stream(case.study.config.study_seed, case.name, 0, f"calibration {name}")
-        record = FreeMotion(
-            time_s, add_noise(motion.step, noise, rng), add_noise(motion.impulse, noise, rng)
-        )
-        columns |= {f"{name}_step_rad": record.step, f"{name}_impulse_rad": record.impulse}
-        arms[name] = calibrate(record, *causes)
+        motion = free_motion(getattr(case.gripper, name), time_s, *causes)
+        measured = np.stack([add_noise(clean, noise, rng) for clean in motion])
+        columns |= zip((f"{name}_step_rad", f"{name}_impulse_rad"), measured, strict=True)
+        arms[name], uncertainty[name] = calibrate(time_s, measured, *causes)
     write_arrays(records, columns)
-    write_text(gripper, calibration_yaml(arms["left"], arms["right"]))
+    write_text(gripper, calibration_yaml(arms, uncertainty))
 
 
 def record(case: Case, recorded: Path, measurements: Path) -> None:
@@ -117,6 +116,4 @@ def record(case: Case, recorded: Path, measurements: Path) -> None:
     remarks = tuple(trace.remarks())
     for remark in remarks:
         warn(f"{place(recorded)}: {remark}")
-    known = trace.sd, trace.correlation, trace.sd_known, trace.onset_s, remarks
-    measured_trace = Measurements(trace.time_s, None, {0: trace.readings}, *known)
-    write_measurements(measurements, measured_trace)
+    write_measurements(measurements, measurements_of(replace(trace, remarks_before=remarks)))

@@ -5,30 +5,21 @@ What the paper's printed values and errors leave of the numbers that it printed,
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import replace
 from decimal import Decimal, InvalidOperation
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from biogrip.arrays import Array
+import biogrip_study.records.identifications as records
 from biogrip.digits import counted
-from biogrip.judging.quantities import quantity_value
+from biogrip.judging.quantities import parameters_and_sum, quantity_value
 from biogrip.judging.verdicts import DETERMINED
 from biogrip_study.config.study import Case, Study
-from biogrip_study.records.identifications import (
-    ALL,
-    basins,
-    near_noise,
-    near_noise_words,
-    read_identifications,
-    read_verdicts,
-    share_with_limits,
-)
 from biogrip_study.tables.layout import Column, Row, ShownTable, titled
 
-_PERCENTILES = {"p05": 5, "p25": 25, "median": 50, "p75": 75, "p95": 95}
+_QUANTILES = {"p05": 0.05, "p25": 0.25, "median": 0.5, "p75": 0.75, "p95": 0.95}
 _ERROR_COLUMNS = (
     *titled("case", "parameter", "unit"),
     Column("target", "Target", 4),
@@ -37,8 +28,8 @@ _ERROR_COLUMNS = (
     Column("basin", "Runs that end"),
     Column("seeds", "Seeds"),
     *(
-        Column(f"{name}_identified", "Median" if name == "median" else f"{percent} %", 3)
-        for name, percent in _PERCENTILES.items()
+        Column(f"{name}_identified", "Median" if name == "median" else f"{100 * share:g} %", 3)
+        for name, share in _QUANTILES.items()
     ),
     Column("median_error_percent", "Error of the median %", 2),
     Column("median_absolute_error_percent", "Median abs. error %", 2),
@@ -49,38 +40,38 @@ _BASINS = (
 )
 
 
-def _error_columns(near_noise_tolerance: float) -> tuple[Column, ...]:
-    share = f"Share {near_noise_words(near_noise_tolerance)}"
+def _error_columns(study: Study) -> tuple[Column, ...]:
+    share = f"Share {records.near_noise_words(study)}"
     ends = (Column(f"near_noise_{end}", f"95 % {end}", 2) for end in ("from", "to"))
     return (*_ERROR_COLUMNS, Column("near_noise_share", share, 2), *ends)
 
 
 def errors_of_case(case: Case, identifications: Path) -> ShownTable:
     """Compare target and identified values of one case, given its identifications, CSV."""
-    tolerance = case.study.near_noise_tolerance
-    identified = read_identifications(identifications, case, case.study.shown_method.name)
+    identified = records.read_identifications(identifications, case, case.study.shown_method.name)
     of_case: Row = {"case": case.name}
     if identified["noise_rms"].notna().all():
-        near = share_with_limits(int(near_noise(identified, tolerance).sum()), len(identified))
+        near = records.share_with_limits(
+            int(records.near_noise(identified, case.study).sum()), len(identified)
+        )
         of_case |= zip((f"near_noise_{end}" for end in ("share", "from", "to")), near, strict=True)
     rows = []
-    for basin, runs in ({ALL: identified} | basins(identified, tolerance)).items():
-        for quantity in case.sample.model.quantities:
-            names = [parameter.name for parameter in quantity]
-            target = quantity_value(label := " + ".join(names), case.parameters)
-            values = runs[[parameter.column for parameter in quantity]].sum(axis=1).to_numpy(float)
+    for basin, runs in ({records.ALL: identified} | records.basins(identified, case.study)).items():
+        found = records.values_by_quantity(runs, case.sample.model)
+        for quantity in parameters_and_sum(case.sample.model):
+            values, target = found[quantity.label], quantity_value(quantity.label, case.parameters)
             of_quantity = {
-                "parameter": label,
-                "unit": quantity[0].unit,
+                "parameter": quantity.label,
+                "unit": quantity.unit,
                 "target": target,
                 "basin": basin,
                 "seeds": len(runs),
-                "median_error_percent": error_percent(target, np.median(values, keepdims=True))[0],
-                "median_absolute_error_percent": np.median(np.abs(error_percent(target, values))),
+                "median_error_percent": error_percent(target, values.median()),
+                "median_absolute_error_percent": abs(error_percent(target, values)).median(),
             }
-            for name, percent in _PERCENTILES.items():
-                of_quantity[f"{name}_identified"] = np.percentile(values, percent)
-            rows.append(of_case | of_quantity | _of_paper(case, names, target))
+            for name, share in _QUANTILES.items():
+                of_quantity[f"{name}_identified"] = values.quantile(share)
+            rows.append(of_case | of_quantity | _of_paper(case, quantity.label))
     number = f"Table {case.published.table}. " if case.published.table is not None else ""
     caption = (
         f"{number}{case.title}: target and identified parameters over "
@@ -88,24 +79,25 @@ def errors_of_case(case: Case, identifications: Path) -> ShownTable:
         if case.parameters
         else f"{case.title}: parameters identified in the recorded trace."
     )
-    return ShownTable(caption, _error_columns(tolerance), rows)
+    return ShownTable(caption, _error_columns(case.study), rows)
 
 
-def error_percent(target: float | None, identified: Array) -> Array:
-    """Return (target - identified) / target in percent; NaN if the target is zero or unknown."""
-    if not target:
-        return np.full_like(identified, np.nan)
-    return 100 * (target - identified) / target
+def error_percent(target: float | None, identified: Any) -> Any:
+    """Return (target - identified) / target in percent, of one value or of several.
+
+    NaN if the target is zero or unknown.
+    """
+    return 100 * (target - identified) / target if target else np.nan * identified
 
 
-def _of_paper(case: Case, names: list[str], target: float | None) -> Row:
+def _of_paper(case: Case, label: str) -> Row:
     """Return the paper's value and error; of a sum, what its members' printed errors make them."""
-    told, printed = value_in_case(case, names), case.published
+    told, printed = value_in_case(case, label.split(" + ")), case.published
     if told is None:
         return {}
-    value, error = told[0], error_percent(target, np.array(told[:1]))[0]
-    if len(names) == 1:
-        value, error = printed.identified[names[0]], printed.error_percent.get(names[0])
+    value, error = told[0], error_percent(quantity_value(label, case.parameters), told[0])
+    if label in printed.identified:
+        value, error = printed.identified[label], printed.error_percent.get(label)
     return {"paper_identified": value, "paper_error_percent": error}
 
 
@@ -117,27 +109,32 @@ def errors(study: Study, identifications: list[Path]) -> ShownTable:
         # Text, as ">100", stays; not every case or parameter has one.
         with suppress(ValueError, TypeError, KeyError):
             row["paper_error_percent"] = float(row["paper_error_percent"])
-    columns = _error_columns(study.near_noise_tolerance)
+    columns = _error_columns(study)
     return ShownTable(f"Identification errors of all cases. {_BASINS}", columns, rows)
 
 
-_VERDICT_COLUMNS = (
-    *titled("case", "quantity", "unit"),
-    Column("target", "Target", 4),
-    *titled("fit", "verdict"),
-    Column("value", "Estimate", 3),
-    Column("low", "{percent} from", 3),
-    Column("high", "{percent} to", 3),
-    Column("excluded", "Except"),
-    Column("expected_verdict", "Expected verdict"),
-    Column("expected_low", "Expected from", 3),
-    Column("expected_high", "Expected to", 3),
-)
+def _verdict_columns(confidence: float) -> tuple[Column, ...]:
+    percent = f"{100 * confidence:g} %"
+    return (
+        *titled("case", "quantity", "unit"),
+        Column("target", "Target", 4),
+        *titled("fit", "verdict"),
+        Column("value", "Estimate", 3),
+        Column("low", f"{percent} from", 3),
+        Column("high", f"{percent} to", 3),
+        Column("excluded", "Except"),
+        Column("expected_verdict", "Expected verdict"),
+        Column("expected_low", "Expected from", 3),
+        Column("expected_high", "Expected to", 3),
+    )
 
 
 def verdicts_of_case(case: Case, verdicts: Path, expected: list[Path]) -> ShownTable:
     """List the verdicts on all quantities of a case, and those expected, where there are any."""
-    judged, others = read_verdicts(verdicts), [read_verdicts(path) for path in expected]
+    judged, others = (
+        records.read_verdicts(verdicts),
+        [records.read_verdicts(path) for path in expected],
+    )
     foreseen_of = {item["quantity"]: item for item in others[0]["quantities"]} if others else {}
     rows = []
     for item in judged["quantities"]:
@@ -165,9 +162,7 @@ def verdicts_of_case(case: Case, verdicts: Path, expected: list[Path]) -> ShownT
     )
     if others:
         caption += " Expected: the same for the trace without noise, judged at the noise level."
-    percent = f"{100 * judged['confidence']:g} %"
-    columns = tuple(replace(c, heading=c.heading.format(percent=percent)) for c in _VERDICT_COLUMNS)
-    return ShownTable(caption, columns, rows)
+    return ShownTable(caption, _verdict_columns(judged["confidence"]), rows)
 
 
 def interval_of(
@@ -200,13 +195,13 @@ def value_in_case(case: Case, names: Sequence[str]) -> tuple[float, float, float
     told = case.published
     if not all(name in told.identified for name in names):
         return None
-    sums = [0.0, 0.0, 0.0]
+    members = []
     for name in names:
         printed, target = told.identified[name], case.parameters.get(name)
         low, high = interval_of(printed, target, told.error_percent.get(name))
-        value = printed if low <= printed <= high else (low + high) / 2
-        sums = [total + number for total, number in zip(sums, (value, low, high), strict=True)]
-    return sums[0], sums[1], sums[2]
+        members.append((printed if low <= printed <= high else (low + high) / 2, low, high))
+    value, low, high = np.sum(members, axis=0).tolist()
+    return value, low, high
 
 
 def _ways(printed: Decimal) -> list[tuple[Decimal, Decimal]]:

@@ -1,4 +1,4 @@
-"""Tables: written as CSV for computing and as HTML for reading, and put in other formats.
+"""Tables: written as CSV for computing and as HTML for reading, and as Markdown.
 
 CSV has six significant digits, print as many as a column says, of the number in the CSV.
 """
@@ -26,10 +26,6 @@ _STYLE = (
     "th{border-bottom:2px solid #333}p{max-width:60em}"
 )
 _TAG = re.compile("<(?=[A-Za-z/!?])")
-_LATEX = str.maketrans(
-    {mark: rf"\{mark}" for mark in "%_&#${}"}
-    | {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
-)
 
 
 @dataclass(frozen=True)
@@ -79,36 +75,25 @@ def write(table: ShownTable, output: Path) -> None:
     write_text(output.with_suffix(".html"), html)
 
 
-def convert(page: Path, ending: str) -> str:
-    """Return a table's HTML as Markdown, `.md`, or LaTeX, `.tex`."""
-    # Well-formed after its first line, as `write` made it, but for what pandas makes of two blanks.
+def markdown_of(page: Path) -> str:
+    """Return a table's HTML, as `write` made it, as Markdown."""
+    # Well-formed after its first line, but for what pandas makes of two blanks.
     text = page.read_text(encoding="utf-8").partition("\n")[2].replace("&nbsp;", " ")
     body = ElementTree.fromstring(text)[1]
-    caption = body.findtext("p", "")
-    headings, *rows = ([cell.text or "" for cell in row] for row in body.iter("tr"))
-    shown = pd.DataFrame(rows, columns=headings)
-    if ending == ".md":
-        barless = shown.map(_without_bars).rename(columns=_without_bars)
-        table = barless.to_markdown(index=False, disable_numparse=True)
-        return f"{_TAG.sub('&lt;', caption)}\n\n{table}\n"
-    return shown.to_latex(
-        index=False,
-        escape=True,
-        caption=" ".join(caption.split()).translate(_LATEX),
-        label=f"tab:{page.stem}",
-        column_format="l" * shown.shape[1],
-    )
+    headings, *rows = ([_without_bars(cell.text or "") for cell in row] for row in body.iter("tr"))
+    table = pd.DataFrame(rows, columns=headings).to_markdown(index=False, disable_numparse=True)
+    return f"{_TAG.sub('&lt;', body.findtext('p', ''))}\n\n{table}\n"
 
 
-def write_converted(page: Path, converted: Path) -> None:
-    """Write a table's HTML in the format that the name of a file says, see `convert`."""
-    write_text(converted, convert(page, converted.suffix))
+def write_markdown(page: Path, markdown: Path) -> None:
+    """Write a table's HTML as Markdown."""
+    write_text(markdown, markdown_of(page))
 
 
 def as_published(table: Path) -> tuple[str, str]:
     """Return name and text under which a table is published: CSV as it is, HTML as Markdown."""
     if table.suffix == ".html":
-        return f"{table.stem}.md", convert(table, ".md")
+        return f"{table.stem}.md", markdown_of(table)
     return table.name, table.read_bytes().decode()
 
 

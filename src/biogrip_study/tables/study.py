@@ -7,24 +7,15 @@ import numpy as np
 import pandas as pd
 from scipy.special import betaincinv
 
+import biogrip_study.records.identifications as records
 from biogrip.fit.nested_fits import aic_and_bic
 from biogrip.judging.likelihood import least_sd
-from biogrip.judging.quantities import Quantity, parameters_and_sum, quantity_value
+from biogrip.judging.quantities import parameters_and_sum, quantity_value
 from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
 from biogrip.levels import WIDE
 from biogrip.physics.noise import standard_deviation
 from biogrip_study.config.study import Case, Study
-from biogrip_study.gripper.calibration import with_calibration
 from biogrip_study.methods.registry import METHODS
-from biogrip_study.records.identifications import (
-    ENCODABLE,
-    INTERVALS,
-    MODEL_FITS,
-    chi_square_increase,
-    reached_encodable,
-    read_identifications,
-    share_with_limits,
-)
 from biogrip_study.records.rows import require_rows, seeds_of
 from biogrip_study.records.traces import read_target
 from biogrip_study.tables.cases import error_percent
@@ -46,26 +37,24 @@ def methods(study: Study, identifications: list[Path]) -> ShownTable:
     rows = []
     labels = {}
     for (name, case), path in zip(study.cases.items(), identifications, strict=True):
-        identified = read_identifications(path, case)
-        identified["increase"] = chi_square_increase(identified, case)
-        identified["least"] = chi_square_increase(identified, case, ENCODABLE)
-        identified["reached"] = reached_encodable(identified, case)
+        identified = records.read_identifications(path, case)
+        identified["increase"] = records.chi_square_increase(identified, case)
+        identified["least"] = records.chi_square_increase(identified, case, records.ENCODABLE)
+        identified["reached"] = records.reached_encodable(identified, case)
         for method, mine in identified.groupby("method", sort=False):
             row: Row = {
                 "case": name,
                 "method": METHODS[method].title,
                 "seeds": len(mine),
-                "median_rise": np.median(mine["increase"]),
-                "encodable_rise": np.median(mine["least"]),
-                "median_evaluations": float(mine["evaluations"].median()),
+                "median_rise": mine["increase"].median(),
+                "encodable_rise": mine["least"].median(),
+                "median_evaluations": mine["evaluations"].median(),
             }
-            shares = share_with_limits(int(mine["reached"].sum()), len(mine))
+            shares = records.share_with_limits(int(mine["reached"].sum()), len(mine))
             row |= zip(("reached_share", "reached_low", "reached_high"), shares, strict=True)
-            for quantity in case.sample.model.quantities:
-                label = " + ".join(p.name for p in quantity)
-                values = mine[[p.column for p in quantity]].sum(axis=1).to_numpy(float)
-                error = np.abs(error_percent(quantity_value(label, case.parameters), values))
-                row[f"error_percent {label}"] = np.median(error)
+            for label, values in records.values_by_quantity(mine, case.sample.model).items():
+                error = error_percent(quantity_value(label, case.parameters), values)
+                row[f"error_percent {label}"] = abs(error).median()
                 labels[f"error_percent {label}"] = f"Error {label} %"
             rows.append(row)
     errors = (Column(name, heading, 2) for name, heading in labels.items())
@@ -92,26 +81,24 @@ _MODEL_COLUMNS = (
 
 def models(study: Study, fits: list[Path]) -> ShownTable:
     """Count over seeds which model has the lowest AIC and BIC, see `aic_and_bic`."""
-    fitted = pd.concat([read_fits(study, path) for path in fits])
-    fitted["aic"], fitted["bic"] = aic_and_bic(
-        fitted["misfit"], fitted["samples"], fitted["parameters"]
-    )
-    rows = []
-    for case, made in study.cases.items():
-        maker = None if made.recorded else made.sample.candidate
-        of_case = fitted[fitted["case"] == case]
-        # In the configured order, since idxmin takes the first of equals.
-        tried = list(of_case["model"].unique())
-        values = {c: of_case.pivot(index="seed", columns="model", values=c) for c in ("aic", "bic")}
-        delta = {c: wide[tried].sub(wide.min(axis=1), axis=0) for c, wide in values.items()}
-        for name in tried:
-            model = made.models[name].model
-            row: Row = {"case": case, "model": model.title + " (made the traces)" * (name == maker)}
-            row |= {"parameters": len(model.names), "seeds": len(delta["aic"])}
-            for criterion, above_lowest in delta.items():
-                row[f"median_delta_{criterion}"] = above_lowest[name].median()
-                row[f"chosen_by_{criterion}"] = (above_lowest.idxmin(axis=1) == name).sum()
-            rows.append(row)
+    fitted = pd.concat([read_fits(study, path) for path in fits], ignore_index=True)
+    told = fitted["misfit"], fitted["samples"], fitted["parameters"]
+    fitted["aic"], fitted["bic"] = aic_and_bic(*told)
+    for name in ("aic", "bic"):
+        of_traces = fitted.groupby(["case", "seed"])[name]
+        fitted[f"delta_{name}"] = fitted[name] - of_traces.transform("min")
+        # Of equals the first, in the configured order.
+        fitted[f"by_{name}"] = fitted.index.isin(of_traces.idxmin())
+    rows: list[Row] = []
+    for (case, candidate), of_model in fitted.groupby(["case", "model"], sort=False):
+        made = study.cases[case]
+        maker, model = candidate == made.sample.candidate, made.models[candidate].model
+        row: Row = {"case": case, "parameters": len(model.names), "seeds": len(of_model)}
+        row["model"] = model.title + " (made the traces)" * (maker and not made.recorded)
+        for name in ("aic", "bic"):
+            row[f"median_delta_{name}"] = of_model[f"delta_{name}"].median()
+            row[f"chosen_by_{name}"] = of_model[f"by_{name}"].sum()
+        rows.append(row)
     caption = (
         "Simplest adequate model: by how much each model's AIC and BIC exceed the lowest, and in "
         "how many seeds it has the lowest."
@@ -122,7 +109,9 @@ def models(study: Study, fits: list[Path]) -> ShownTable:
 def read_fits(study: Study, path: Path) -> pd.DataFrame:
     """Read the fits of every model of a case, in the seeds of a batch."""
     case = study.cases[path.parent.name]
-    return MODEL_FITS.read(path, case=[case.name], model=case.models, seed=seeds_of(path.stem))
+    return records.MODEL_FITS.read(
+        path, case=[case.name], model=case.models, seed=seeds_of(path.stem)
+    )
 
 
 _COVERAGE_COLUMNS = (
@@ -146,30 +135,23 @@ _COVERAGE_COLUMNS = (
 _COUNTED = {"determined": (DETERMINED,), "one_sided": (BOUNDED_BELOW, BOUNDED_ABOVE)}
 
 
-def coverage(
-    study: Study, targets: list[Path], intervals: list[Path], calibrated: list[Path]
-) -> ShownTable:
+def coverage(study: Study, targets: list[Path], intervals: list[Path]) -> ShownTable:
     """Compare estimates and intervals of many seeds with the true values and the bound.
 
-    Targets are files of all cases, in their order; calibrated grippers are named like their case.
+    Targets are files of all cases, in their order.
     """
     rows: list[Row] = []
-    estimated = pd.concat([read_intervals(study, path) for path in intervals], ignore_index=True)
-    for (name, case), target in zip(study.cases.items(), targets, strict=True):
-        of_case = estimated[estimated["case"] == name]
-        of_calibration = [file for file in calibrated if file.stem == name]
-        for quantity, limit in bounds_at_truth(case, target, of_calibration):
-            mine = of_case[of_case["quantity"] == quantity.label]
-            fitted = mine[mine["estimate_rest_known"].notna()]
-            shown = mine[mine["verdict"].notna()]
-            if fitted.empty and not np.any(shown["verdict"] != NOT_DETERMINED):
-                continue
-            truth = quantity_value(quantity.label, case.parameters) or 0.0
-            head = {"case": name, "quantity": quantity.label, "unit": quantity.unit}
-            numbers = _spreads(fitted, truth, 100 * limit, case.confidence) | _verdicts_shown(
-                shown, truth
-            )
-            rows.append({**head, "target": truth, **numbers})
+    files = zip(study.cases.items(), targets, strict=True)
+    bounds = {name: bounds_at_truth(case, target) for (name, case), target in files}
+    for case, head, estimated in _by_quantity(study, intervals):
+        fitted = estimated[estimated["estimate_rest_known"].notna()]
+        shown = estimated[estimated["verdict"].notna()]
+        if fitted.empty and not np.any(shown["verdict"] != NOT_DETERMINED):
+            continue
+        truth = head["target"] or 0.0
+        limit = 100 * bounds[case.name][head["quantity"]]
+        of_fits = _spreads(fitted, truth, limit, case.confidence)
+        rows.append({**head, "target": truth, **of_fits, **_verdicts_shown(shown, truth)})
     caption = (
         "Least squares over many seeds, for every quantity that a case's traces should determine: "
         "standard deviation of the estimates' logarithms beside the Cramér-Rao bound, and how "
@@ -184,22 +166,33 @@ def coverage(
     return ShownTable(caption, _COVERAGE_COLUMNS, rows)
 
 
-def bounds_at_truth(
-    case: Case, target: Path, calibrated: Sequence[Path]
-) -> list[tuple[Quantity, float]]:
-    """Return what is searched of a case, each with its Cramér-Rao bound at the true parameters.
+def _by_quantity(
+    study: Study, intervals: Sequence[Path]
+) -> Iterator[tuple[Case, Row, pd.DataFrame]]:
+    """Yield what the first columns say of every quantity of a case, and its rows of all batches."""
+    estimated = pd.concat([read_intervals(study, path) for path in intervals], ignore_index=True)
+    for name, case in study.cases.items():
+        of_case = estimated[estimated["case"] == name]
+        for quantity in parameters_and_sum(case.experiment.searched):
+            target = quantity_value(quantity.label, case.parameters)
+            head = {"case": name, "quantity": quantity.label, "unit": quantity.unit}
+            yield case, head | {"target": target}, of_case[of_case["quantity"] == quantity.label]
+
+
+def bounds_at_truth(case: Case, target: Path) -> dict[str, float]:
+    """Return the Cramér-Rao bound of what is searched of a case, at the true parameters, by label.
 
     That is the standard deviation of the quantity's logarithm.
     """
-    experiment = with_calibration(case.experiment, calibrated)
+    experiment = case.experiment
     time_s, _, rotation = read_target(target, case.times_s)
     log_truth = experiment.logs(case.parameters)
     _, sensitivity = experiment.of(time_s, rotation).residuals(log_truth)
     noise_sd = standard_deviation(rotation, case.noise)
-    quantities = parameters_and_sum(experiment.searched)
-    return [
-        (quantity, least_sd(sensitivity, noise_sd, log_truth, quantity)) for quantity in quantities
-    ]
+    return {
+        quantity.label: least_sd(sensitivity, noise_sd, log_truth, quantity)
+        for quantity in parameters_and_sum(experiment.searched)
+    }
 
 
 def read_intervals(study: Study, path: Path) -> pd.DataFrame:
@@ -207,7 +200,7 @@ def read_intervals(study: Study, path: Path) -> pd.DataFrame:
 
     Seeds that are judged in full have all quantities.
     """
-    case, frame = study.cases[path.parent.name], INTERVALS.read(path)
+    case, frame = study.cases[path.parent.name], records.INTERVALS.read(path)
     every = [quantity.label for quantity in parameters_and_sum(case.experiment.searched)]
     estimated = frame.loc[frame["estimate_rest_known"].notna(), "quantity"].unique()
     often = case.block.identifiability.verdicts_every
@@ -279,15 +272,11 @@ _COUNT_COLUMNS = (
 
 def verdict_counts(study: Study, intervals: list[Path]) -> ShownTable:
     """Count verdicts of whole profiles, and those whose limits hold the true value."""
-    rows: list[Row] = []
-    estimated = pd.concat([read_intervals(study, path) for path in intervals], ignore_index=True)
-    for name, case in study.cases.items():
-        of_case = estimated[estimated["case"] == name]
-        for quantity in parameters_and_sum(case.experiment.searched):
-            mine = of_case[(of_case["quantity"] == quantity.label) & of_case["verdict"].notna()]
-            target = quantity_value(quantity.label, case.parameters)
-            head: Row = {"case": name, "quantity": quantity.label, "unit": quantity.unit}
-            rows += [head | row for row in _counts(mine, target)]
+    rows = [
+        head | row
+        for _, head, estimated in _by_quantity(study, intervals)
+        for row in _counts(estimated[estimated["verdict"].notna()], head["target"])
+    ]
     percents = " or ".join(sorted({f"{100 * case.confidence:g}" for case in study.cases.values()}))
     caption = (
         f"Verdicts from whole profiles at {percents} %, as users are shown them, in every seed: "
@@ -300,7 +289,7 @@ def verdict_counts(study: Study, intervals: list[Path]) -> ShownTable:
 def _counts(judged: pd.DataFrame, target: float | None) -> Iterator[Row]:
     for verdict, mine in judged.groupby("verdict"):
         count = len(mine)
-        row: Row = {"target": target, "verdict": verdict, "seeds": len(judged), "reached": count}
+        row: Row = {"verdict": verdict, "seeds": len(judged), "reached": count}
         row |= _interval("reached", count, len(judged))
         if verdict == DETERMINED:
             row["narrow"] = np.sum(mine["shown_high"] <= WIDE**2 * mine["shown_low"])

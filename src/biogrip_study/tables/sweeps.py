@@ -7,22 +7,23 @@ import math
 from collections.abc import Iterator, Mapping
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from biogrip.arrays import Array, BoolArray
+import biogrip_study.records.identifications as records
+from biogrip.arrays import BoolArray
 from biogrip.judging.likelihood import bounds_percent, headlines
-from biogrip.judging.quantities import Quantity
+from biogrip.judging.quantities import Quantity, quantity_value
 from biogrip.physics.noise import rms
 from biogrip.physics.simulation import simulated_response
 from biogrip_study.config.study import Case, Study
 from biogrip_study.config.study_blocks import AxisBlock
-from biogrip_study.gripper.calibration import with_calibration
 from biogrip_study.methods.genome import nearest_encodable
 from biogrip_study.methods.registry import METHODS
-from biogrip_study.records.identifications import near_noise, near_noise_words, read_batch
 from biogrip_study.records.rows import RowFile
+from biogrip_study.tables.cases import error_percent
 from biogrip_study.tables.layout import Column, Row, ShownTable
 
 POINTS = RowFile(
@@ -39,38 +40,29 @@ POINTS = RowFile(
 _FACTOR, _BOUNDS_OF_BASIN = math.log(2), 4.0
 
 
-def judge_points(
-    study: Study, sweep: str, identifications: list[Path], calibrated: list[Path], points: Path
-) -> None:
+def judge_points(study: Study, sweep: str, identifications: list[Path], points: Path) -> None:
     """Compute errors and shares of successful seeds at every point of a sweep.
 
-    Batches of identifications are in folders named like point and method, calibrations are named
-    like their point.
+    Batches of identifications are in folders named like point and method.
     """
-    files: dict[tuple[str, str], list[Path]] = {}
-    for path in identifications:
-        files.setdefault((path.parts[-3], path.parts[-2]), []).append(path)
-    calibrations = {path.stem: [path] for path in calibrated}
-    block = study.config.sweeps[sweep]
-    rows: list[tuple[str | int, ...]] = []
+    block, rows = study.config.sweeps[sweep], list[tuple[str | int, ...]]()
     for name in block.cases:
         true, grid, bounds = study.cases[name].parameters, block.points(sweep, name), {}
         for point in grid:
             case = study.points[point.name]
-            problem = with_calibration(case.experiment, calibrations.get(point.name, []))
-            bounds[point.name] = bounds_percent(problem, case.noise, true, case.times_s)
+            bounds[point.name] = bounds_percent(case.experiment, case.noise, true, case.times_s)
         heads = headlines(
             [(q.label, percent) for of_point in bounds.values() for q, percent in of_point]
         )
         for point, method in product(grid, study.config.methods):
             case = study.points[point.name]
-            runs = pd.concat([read_batch(path, case) for path in files[point.name, method]])
+            batches = [file for file in identifications if file.parts[-3:-1] == (case.name, method)]
+            runs = pd.concat([records.read_batch(file, case) for file in batches])
             if case.noise.absent:
                 # Without noise, the misfit of the true values rounded to the genes' digits.
                 runs = runs.assign(noise_rms=_resolution(case, true))
-            near = float(np.mean(near_noise(runs, study.near_noise_tolerance)))
             head = point.name, point.row.shown, point.column.shown, method
-            judged = _judged(case, true, runs, bounds[point.name], heads, near)
+            judged = _judged(case, true, runs, bounds[point.name], heads)
             rows += ((*head, *numbers) for numbers in judged)
     POINTS.write(points, rows)
 
@@ -81,52 +73,43 @@ def _judged(
     runs: pd.DataFrame,
     bounds: list[tuple[Quantity, float]],
     heads: list[str],
-    near: float,
 ) -> Iterator[tuple[str | int, ...]]:
-    searched = point.experiment.searched.parameters
-    errors, inside = {}, np.ones(len(runs), dtype=bool)
-    for q, percent in bounds:
-        members = [searched[index] for index in q.members]
-        truth = sum(true[p.name] for p in members)
-        values = runs[[p.column for p in members]].sum(axis=1).to_numpy(float)
-        errors[q.label] = 100 * np.abs(values - truth) / (truth or np.nan)
-        if q.label in heads:
-            inside &= in_basin(values, truth, percent / 100)
-    for q, percent in bounds:
-        every = errors[q.label]
-        medians = [np.median(some) if len(some) else np.nan for some in (every, every[inside])]
-        share = float(np.mean(inside)) if heads else np.nan
-        numbers = (near, share, *medians, percent)
-        yield q.label, len(runs), *("" if np.isnan(x) else f"{x:.6g}" for x in numbers)
+    """Yield quantity, number of runs, shares, median errors and bound in percent."""
+    found = records.values_by_quantity(runs, point.experiment.searched)
+    inside = np.ones(len(runs), dtype=bool)
+    for quantity, percent in bounds:
+        if (label := quantity.label) in heads:
+            inside &= in_basin(found[label], quantity_value(label, true), percent / 100)
+    near = np.mean(records.near_noise(runs, point.study))
+    shares = near, np.mean(inside) if heads else np.nan
+    for quantity, percent in bounds:
+        truth = quantity_value(quantity.label, true)
+        errors = abs(error_percent(truth, found[quantity.label]))
+        numbers = *shares, errors.median(), errors[inside].median(), percent
+        yield quantity.label, len(runs), *("" if np.isnan(x) else f"{x:.6g}" for x in numbers)
 
 
-def in_basin(values: Array, truth: float, bound: float) -> BoolArray:
+def in_basin(values: Any, truth: float | None, bound: float) -> BoolArray:
     """Return True where identified values lie in the basin of the truth, (n_seeds,).
 
     The basin reaches to a factor of two or, where the noise allows no more, to four times the
     bound of the logarithm. Without noise the bound is NaN and the factor holds.
     """
     with np.errstate(divide="ignore"):
-        away = np.abs(np.log(values / truth))
-    return away <= np.fmax(_FACTOR, _BOUNDS_OF_BASIN * bound)
+        away = np.abs(np.log(np.divide(values, truth or 0.0)))
+    return np.asarray(away <= np.fmax(_FACTOR, _BOUNDS_OF_BASIN * bound))
 
 
 def _resolution(point: Case, true: Mapping[str, float]) -> float:
     """Return the noise-free RMS misfit of the encodable parameters nearest to the truth."""
-    problem = point.experiment
-    time_s = point.times_s
-    truth = [true[p.name] for p in problem.model.parameters]
-    rounded = [
-        problem.fixed.get(p.name, nearest_encodable(value, problem.ranges[p.range_name]))
-        for p, value in zip(problem.model.parameters, truth, strict=True)
-    ]
-    both = simulated_response(
-        problem.gripper,
-        problem.model.network(np.array([truth, rounded])),
-        problem.torque,
-        time_s,
-    )
-    return rms(both[1] - both[0])
+    experiment = point.experiment
+    rounded = dict(true)
+    for parameter in experiment.searched.parameters:
+        genes = experiment.ranges[parameter.range_name]
+        rounded[parameter.name] = nearest_encodable(true[parameter.name], genes)
+    model, given = experiment.model, (experiment.torque, point.times_s)
+    both = [model.sample(values) for values in (true, rounded)]
+    return rms(np.subtract(*(simulated_response(experiment.gripper, of, *given) for of in both)))
 
 
 # By column of points: name and heading of the columns that the table has for every method.
@@ -152,24 +135,19 @@ _CAPTION = (
 def robustness(study: Study, sweep: str, points: Path) -> ShownTable:
     """Return a row for each point of a sweep and the best and worst determined quantity."""
     block, frame = study.config.sweeps[sweep], POINTS.read(points)
-    frame["case"] = frame["point"].str.partition("--")[0]
     silent = frame["bound_percent"].isna()
     frame.loc[silent, _ERRORS] = frame.loc[silent, _ERRORS].clip(lower=_LEAST_PERCENT)
     rows: list[Row] = []
-    for case in block.cases:
-        of_case = frame[frame["case"] == case]
+    for case, of_case in frame.groupby(frame["point"].str.partition("--")[0], sort=False):
         first = of_case[of_case["method"] == study.shown_method.name]
         for quantity in headlines([*zip(first["quantity"], first["bound_percent"], strict=True)]):
             chosen = of_case[of_case["quantity"] == quantity]
             for _, at_point in chosen.groupby("point", sort=False):
-                row = at_point.iloc[0][["case", "row", "column", "quantity", "bound_percent"]]
-                by_method = {
-                    f"{ours}_{method}": values[theirs]
-                    for method, values in at_point.set_index("method").iterrows()
-                    for theirs, (ours, _) in _BY_METHOD.items()
-                }
-                rows.append(row.to_dict() | by_method)
-    words = near_noise_words(study.near_noise_tolerance)
+                row = {"case": case, **at_point.iloc[0]}
+                for method, values in at_point.set_index("method").iterrows():
+                    row |= {f"{to}_{method}": values[of] for of, (to, _) in _BY_METHOD.items()}
+                rows.append(row)
+    words = records.near_noise_words(study)
     columns = (
         Column("case", "Case"),
         Column("row", _axis_heading(study, block.rows)),
