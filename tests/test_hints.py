@@ -146,7 +146,9 @@ def other_zero(path: Path) -> list[str]:
         1 / 500 - np.expm1(-np.maximum(t, 0) / 5) / 400 for t in (time_s, time_s - 15.125)
     ]
     strain = 5 * compliance[0] - 3 * compliance[1] * (time_s >= 15.125)
-    write_trace(path, time_s, steady(strain) + 2e-3, load, header="time_s,strain,load_Pa")
+    write_trace(
+        path, time_s, np.asarray(steady(strain) + 2e-3, float), load, header="time_s,strain,load_Pa"
+    )
     return ["--reading", "strain", "--load", "load_Pa", *CREEP[2:]]
 
 
@@ -242,8 +244,11 @@ def test_every_hint_of_the_source_is_of_a_kind() -> None:
             # Options themselves, their help, and how a notebook says them.
             continue
         tree = ast.parse(path.read_text())
-        bodies = (node for node in ast.walk(tree) if hasattr(node, "body"))
-        documents = [ast.get_docstring(node, clean=False) for node in bodies if _documented(node)]
+        documents = [
+            ast.get_docstring(node, clean=False)
+            for node in ast.walk(tree)
+            if isinstance(node, ast.AsyncFunctionDef | ast.FunctionDef | ast.ClassDef | ast.Module)
+        ]
         for node in ast.walk(tree):
             text = getattr(node, "value", None)
             if not isinstance(node, ast.Constant) or not isinstance(text, str):
@@ -254,10 +259,6 @@ def test_every_hint_of_the_source_is_of_a_kind() -> None:
                 unknown += [] if found else [f"{path.name}, line {node.lineno}: {text}"]
     assert not unknown
     assert {*known} == seen
-
-
-def _documented(node: ast.AST) -> bool:
-    return isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef)
 
 
 def test_models_have_the_names_that_people_type(tmp_path: Path) -> None:
