@@ -141,14 +141,13 @@ def other_model(path: Path) -> list[str]:
 
 def other_zero(path: Path) -> list[str]:
     """Two steps, which tell a zero from a sample; the first comes with the first row."""
-    time_s, load = np.arange(0.0, 30, 0.25), 5.0 - 3.0 * (np.arange(0.0, 30, 0.25) >= 15.125)
+    time_s = np.arange(0.0, 30, 0.25)
+    load = np.where(time_s < 15.125, 5.0, 2.0)
     compliance = [
         1 / 500 - np.expm1(-np.maximum(t, 0) / 5) / 400 for t in (time_s, time_s - 15.125)
     ]
     strain = 5 * compliance[0] - 3 * compliance[1] * (time_s >= 15.125)
-    write_trace(
-        path, time_s, np.asarray(steady(strain) + 2e-3, float), load, header="time_s,strain,load_Pa"
-    )
+    write_trace(path, time_s, steady(strain) + 2e-3, load, header="time_s,strain,load_Pa")
     return ["--reading", "strain", "--load", "load_Pa", *CREEP[2:]]
 
 
