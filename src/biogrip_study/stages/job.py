@@ -159,7 +159,8 @@ def called(stage: str, job: Any) -> Any:
 def arguments(job: Any, function: Callable[..., object]) -> dict[str, Any]:
     """Return what a function takes: params, wildcards and files of a job's rule, by their names.
 
-    ``case`` is the case, ``study`` the study, and ``seeds`` are those of the batch.
+    ``case`` is the case, ``study`` the study, and ``seeds`` are those of the batch. Files of
+    calibrated grippers, the input ``calibrated``, are told to the cases that they are named like.
     """
     of_job = job.params, job.wildcards, job.input, job.output
     given: dict[str, Any] = {name: value for of in of_job for name, value in of.items()}
