@@ -96,8 +96,17 @@ def rows_of_moves(found: Mapping[str, Any]) -> list[tuple[str, dict[str, float]]
     return [*rows.items()]
 
 
+def error_in_words(by: float) -> str:
+    """Return how far a printed value is off; beyond a factor of two a linear estimate ends."""
+    if by > 1 or by < -0.5:
+        return f"as {'more than twice' if by > 0 else 'less than half'} what it is"
+    if abs(by) < _LEAST_MOVE:
+        return "right"
+    return f"{plain(100 * abs(by), 2)} % too {'low' if by < 0 else 'high'}"
+
+
 def moves_in_words(found: Mapping[str, Any]) -> list[str]:
-    """Return a line on what a zero moves most, and what is moved most, by the model and by any."""
+    """Return a line on what a zero makes most wrong, and what is most wrong, by model and any."""
     rows, of_model = rows_of_moves(found), {each["quantity"] for each in found["quantities"]}
     said: dict[str, None] = {}
     for some, by_model in ((rows[:1], True), (rows, True), (rows, False)):
@@ -105,8 +114,7 @@ def moves_in_words(found: Mapping[str, Any]) -> list[str]:
         chosen = [each for each in every if (each[1] in of_model) == by_model]
         by, name, words = max(chosen, key=lambda it: abs(it[0]), default=(0.0, "", ""))
         if abs(by) > _LEAST_MOVE:
-            way = f"{'falls' if by < 0 else 'rises'} by {plain(100 * abs(by), 2)} %"
-            said[f"{name} {way} if {words}"] = None
+            said[f"{name} is printed {error_in_words(by)} if {words}"] = None
     return [f"{'; '.join(said)}."] if said else []
 
 
