@@ -205,7 +205,8 @@ def write_page(outcome: Outcome, page: Path) -> None:
     outcomes += [(trace, FAILED, reason) for trace, reason in outcome.refused.items()]
     further = outcome_in_words(outcomes) if several else preferred_in_words(traces[0])
     set_up = together(map(set_up_in_words, traces))
-    assumed: dict[str, dict[str, Any]] = {data["trace"]: data["assumed"] for data in traces}
+    singles = [single for data in traces for single in data.get("traces", [data])]
+    assumed: dict[str, dict[str, Any]] = {single["trace"]: single["assumed"] for single in singles}
     shared = common([*assumed.values()])
     beyond_shared = {trace: _as_yaml(beyond(block, shared)) for trace, block in assumed.items()}
     text = (

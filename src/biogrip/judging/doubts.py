@@ -289,7 +289,7 @@ def name_suspects(residuals: Residuals, times: float, scale: float) -> str:
     if residuals.course.sweeps:
         gives = "has both moduli (Kramers-Kronig)"
         _, culprits = whiteness.find_inertia(residuals, *left)
-    noises = counted(least, "noise")
+    noises = "the noise" if least == "1" else f"{least} times the noise"
     inadequate = f"the model is not adequate, as a linear sample of another kind fits to {noises}"
     if whiteness.correlated(*left)[1] >= levels.FALSE_ALARM:
         if other > levels.TOO_MUCH and times < other * levels.TOO_MUCH:
