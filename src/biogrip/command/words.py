@@ -97,8 +97,10 @@ def without_model_in_words(found: Mapping[str, Any]) -> list[str]:
         return [f"Model-free: {too_large if own['times_noise'] < 1 else why}."]
     width = max(len(each["quantity"]) for each in told)
     lines = (f"  {each['quantity']:<{width}}  {each['in_words']}" for each in told)
-    any_sample = "Model-free, any linear viscoelastic sample that fits"
-    return [f"{any_sample} (least RMS residual {left}), has:", *lines]
+    any_sample = f"any linear viscoelastic sample that fits (least RMS residual {left}), has"
+    if not own["is_linear"] or own["times_noise"] > levels.CLEARLY:
+        any_sample = f"no linear sample fits to the noise; the closest ones, {left}, have"
+    return [f"Model-free, {any_sample}:", *lines]
 
 
 def rows_of_moves(found: Mapping[str, Any]) -> list[tuple[str, dict[str, float]]]:
