@@ -349,12 +349,13 @@ def columns_of(found: Iterable[Mapping[str, Any]]) -> dict[str, str]:
 
 def taken_for_granted(found: Mapping[str, Any]) -> str:
     """Return a sentence naming defaults (gripper, protocol) that the user did not replace."""
-    said = [f"the paper's {name}" for name in found["by_default"]]
+    said = [f"the {name}" for name in found["by_default"]]
     if "protocol" in found["by_default"]:
         phases = found["assumed"]["protocol"]["phases"]
         held = (f"{phase['duration_s']:g} s at {phase['torque_Nm']:g} N m" for phase in phases)
         said[-1] += f" ({', '.join(held)})"
-    return f"Assumed: {' and '.join(said)}; give yours with --config."
+    whose = "of the published gripper study"
+    return f"Assumed: {' and '.join(said)} {whose}; give yours with --config."
 
 
 def limits_in_short(quantity: Mapping[str, Any]) -> str:

@@ -42,7 +42,7 @@ HARMLESS, DOUBT, REJECTION = "harmless", "doubt", "rejection"
 OK, DOUBTFUL, REJECTED = "ok", "doubtful", "rejected"
 """Status of a fit by the heaviest of its notes."""
 
-ROUNDED, RING = "rounded", "ring"
+ROUNDED, RING, NOT_LINEAR = "rounded", "ring", "not linear"
 """What notes are about that others depend on."""
 
 _STATUS = {HARMLESS: OK, DOUBT: DOUBTFUL, REJECTION: REJECTED}
@@ -58,7 +58,7 @@ class Note:
     text: str
     """The sentence."""
     about: str = ""
-    """`ROUNDED` or `RING`, if it is about that."""
+    """`ROUNDED`, `RING` or `NOT_LINEAR`, if it is about that."""
 
 
 def compute_status(notes: Sequence[Note]) -> str:
