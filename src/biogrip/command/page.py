@@ -51,14 +51,15 @@ _BAND, _FIT_IN = 25, (4.4, 3.4)
 
 
 def trace_pictures(diagnosis: Diagnosis, data: Mapping[str, Any]) -> list[str]:
-    """Return pictures of a trace as data URLs: the fit with its residuals, and all profiles.
+    """Return pictures of a trace as data URLs: the fit with its residuals; profiles, and stacked.
 
-    A third one is of the level over time, as far as that is told without a model.
+    A fourth one is of the level over time, as far as that is told without a model.
     """
     drawn, told = draw_best(diagnosis), data["without_model"]["quantities"]
     with style.styled():
         more = [draw_level(diagnosis, data)] if told and diagnosis.recording else []
-        return [address(picture) for picture in (drawn, draw_profiles_of(data), *more)]
+        profiles = [draw_profiles_of(data, stacked=stacked) for stacked in (False, True)]
+        return [address(picture) for picture in (drawn, *profiles, *more)]
 
 
 def draw_level(diagnosis: Diagnosis, data: Mapping[str, Any]) -> Figure:
