@@ -8,16 +8,7 @@ from typing import Any
 
 import biogrip.levels as levels
 from biogrip import __version__
-from biogrip.digits import (
-    counted,
-    instant,
-    legible,
-    plain,
-    times_noise,
-    with_limits,
-    with_unit,
-    within_limits,
-)
+from biogrip.digits import counted, instant, legible, plain, with_limits, with_unit, within_limits
 from biogrip.judging.doubts import DOUBT, DOUBTFUL, HARMLESS, OK, REJECTED, REJECTION
 from biogrip.judging.verdicts import FIT_REJECTED, NOT_DETERMINED
 from biogrip.judging.without_model import BEYOND, EXPONENT, FLOW, LEVEL, LOSS
@@ -88,7 +79,7 @@ def terms_of(found: Mapping[str, Any]) -> list[str]:
 def without_model_in_words(found: Mapping[str, Any]) -> list[str]:
     """Return lines on what any linear sample would show."""
     own, told = found["without_model"], foremost(found)
-    left = times_noise(own["times_noise"])
+    left = _times_noise(own["times_noise"])
     if not _by_noise(found):
         left = f"{in_unit(own['misfit_rad'], found)}, {left}"
     if not told:
@@ -165,7 +156,12 @@ def misfit_in_words(found: Mapping[str, Any]) -> str:
         few = found["misfit_rad"] < levels.TOO_LITTLE * found["scatter_rad"]
         why = " (too large, as few readings follow the course)" if few else ""
         return f"{said}, {noise}{why}, RMS residual {in_unit(found['misfit_rad'], found)}"
-    return f"{said}, RMS residual {times_noise(found['misfit_rad'] / found['scatter_rad'], noise)}"
+    return f"{said}, RMS residual {_times_noise(found['misfit_rad'] / found['scatter_rad'], noise)}"
+
+
+def _times_noise(ratio: float, noise: str = "noise") -> str:
+    times = plain(ratio, 2)
+    return f"as large as the {noise}" if times == "1" else f"{times} times the {noise}"
 
 
 def _by_noise(found: Mapping[str, Any]) -> bool:
@@ -292,9 +288,8 @@ def in_columns(found: Sequence[Mapping[str, Any]], refused: Mapping[str, str]) -
     if refused:
         lines.append(f"Not identified, {len(refused)} of {len(refused) + len(found)}:")
         for text, traces in _alike([*refused.items()]):
-            more = ", ".join(traces[1 : _MOST_NAMED + 1]) + ", ..." * (
-                len(traces) > _MOST_NAMED + 1
-            )
+            dots = ["..."] * (len(traces) > _MOST_NAMED + 1)
+            more = ", ".join([*traces[1 : _MOST_NAMED + 1], *dots])
             like = f" The like holds for {len(traces) - 1} more: {visible(more)}."
             lines.append(indent(visible_lines(text) + like * (len(traces) > 1), "  "))
     return "\n".join(lines)
@@ -485,13 +480,14 @@ def together(several: Iterable[Sequence[str]]) -> list[str]:
             by_start.setdefault(tuple(each.split()[:4]), {})[each] = None
     said = []
     for first, *others in by_start.values():
-        every = [sentence.split() for sentence in (first, *others)]
-        if len({*map(len, every)}) > 1 or len(every) > _MOST_NAMED:
-            alike = f" ({len(others)} likewise with other numbers)."
-            said.append(first.removesuffix(".") + alike)
+        words = [sentence.split() for sentence in (first, *others)]
+        if len(words) > _MOST_NAMED:
+            said.append(f"{first.removesuffix('.')} ({len(others)} likewise with other numbers).")
+        elif len({*map(len, words)}) > 1:
+            said += [first, *others]
         else:
-            words = (", ".join(dict.fromkeys(same)) for same in zip(*every, strict=True))
-            said.append(" ".join(words))
+            alike = zip(*words, strict=True)
+            said.append(" ".join(", ".join(dict.fromkeys(word)) for word in alike))
     return said
 
 

@@ -216,13 +216,8 @@ def _find_notes(left: _Left, misfit: Note | None = None) -> list[Note]:
         doubts += left.lines or changes[-1:] if misfit else left.lines or changes or colour
     notes += (Note(DOUBT, doubt) for doubt in doubts)
     if notes and in_time and not residuals.coloured and compute_status(notes) == DOUBTFUL:
-        notes.append(
-            Note(
-                HARMLESS,
-                "If the set-up is right, measurement.noise_model: coloured, or --noise-model "
-                "coloured, gives intervals that allow for such noise.",
-            )
-        )
+        text = "measurement.noise_model: coloured, or --noise-model coloured, gives intervals that"
+        notes.append(Note(HARMLESS, f"If the set-up is right, {text} allow for such noise."))
     return notes
 
 
@@ -358,14 +353,10 @@ def _about_changes(left: _Left, *, coloured: bool) -> list[str]:
         what = f"readings change at about {plain(0.5 * (before_s + after_s))} s"
         away = "what is before or after (--from, --until)"
         if step.before == 1:
-            what, away = (
-                f"first reading ({plain(before_s)} s) does not fit the rest",
-                "that reading (--from)",
-            )
-        text = (
-            f"white noise hardly does that ({p_value(step.chance)}), and the values may be far off"
-        )
-        said = [f"The {what}, as by a step of {size}: {text}. Leave out {away}."]
+            what = f"first reading ({plain(before_s)} s) does not fit the rest"
+            away = "that reading (--from)"
+        by = f"as by a step of {size}: white noise hardly does that ({p_value(step.chance)})"
+        said = [f"The {what}, {by}, and the values may be far off. Leave out {away}."]
         if left.times > levels.CLEARLY:
             least = plain(fit_any_sample(residuals).sd / left.scale, 2)
             rms = f"The RMS residual is {plain(left.times, 2)} times the noise of the trace"

@@ -133,25 +133,14 @@ class WithoutModel:
 
     def widened(self, others: Sequence["WithoutModel"]) -> "WithoutModel":
         """Return it with limits that hold those of others, too, as of other starts."""
-        told = []
+        told, also = [], [estimate for other in others for estimate in other.told]
         for estimate in self.told:
-            every = [
-                estimate,
-                *(
-                    other
-                    for of in others
-                    for other in of.told
-                    if other.quantity == estimate.quantity
-                ),
-            ]
+            every = [estimate, *(it for it in also if it.quantity == estimate.quantity)]
             lows, highs = np.array([(other.low, other.high) for other in every], dtype=float).T
             ends = [lows.min(), highs.max()] if len(every) > len(others) else [np.nan, np.nan]
             low, high = (None if np.isnan(end) else float(end) for end in ends)
-            told.append(
-                replace(
-                    estimate, value=estimate.value if low and high else None, low=low, high=high
-                )
-            )
+            value = estimate.value if low and high else None
+            told.append(replace(estimate, value=value, low=low, high=high))
         return replace(self, told=told)
 
     def data(self) -> dict[str, Any]:
