@@ -53,9 +53,8 @@ def draw_profiles_of(
             axes.axvline(truth, color=style.TARGET, linewidth=0.7, label="truth")
         style.panel(axes, ascii_letters[index], item["verdict"], 40)
     grid[0].set_ylabel("rise of χ²")
-    drawn.legend(
-        *grid[0].get_legend_handles_labels(), loc="outside lower right", ncols=1 if stacked else 5
-    )
+    lines = grid[0].get_legend_handles_labels()
+    drawn.legend(*lines, loc="outside lower right", ncols=1 if stacked else 5)
     drawn.suptitle(style.literal(title), x=0.01, ha="left", fontsize=8)
     return drawn
 

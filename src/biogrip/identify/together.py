@@ -63,8 +63,8 @@ class Together(Diagnosis):
         told |= {"increase": agreement.increase, "degrees_of_freedom": agreement.freedom}
         ratios = agreement.ratios(np.full(count, 1 / count)).tolist()
         odd = None if agreement.odd is None else self.names[agreement.odd]
-        told |= {"odd": odd, "stiffness_over_mean": ratios}
-        told["in_words"] = _compared(self.names, agreement)
+        said = _compared(self.names, agreement)
+        told |= {"odd": odd, "stiffness_over_mean": ratios, "in_words": said}
         return {
             **judged_data(self),
             **{"noise_model": None, "preferred_model": None, "advice": None},

@@ -42,7 +42,7 @@ HARMLESS, DOUBT, REJECTION = "harmless", "doubt", "rejection"
 OK, DOUBTFUL, REJECTED = "ok", "doubtful", "rejected"
 """Status of a fit by the heaviest of its notes."""
 
-ROUNDED, RING, NOT_LINEAR = "rounded", "ring", "not linear"
+ROUNDED, RING = "rounded", "ring"
 """What notes are about that others depend on."""
 
 _STATUS = {HARMLESS: OK, DOUBT: DOUBTFUL, REJECTION: REJECTED}
@@ -58,7 +58,7 @@ class Note:
     text: str
     """The sentence."""
     about: str = ""
-    """`ROUNDED`, `RING` or `NOT_LINEAR`, if it is about that."""
+    """`ROUNDED`, `RING` or `biogrip.judging.linearity.NOT_LINEAR`, if it is about that."""
 
 
 def compute_status(notes: Sequence[Note]) -> str:

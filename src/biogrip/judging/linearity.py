@@ -14,19 +14,14 @@ import biogrip.levels as levels
 from biogrip.arrays import Array
 from biogrip.digits import p_value, plain, with_limits
 from biogrip.fit.noise_model_fit import absorbed
-from biogrip.judging.doubts import (
-    DOUBT,
-    MANY,
-    NOT_LINEAR,
-    REJECTED,
-    REJECTION,
-    Note,
-    compute_status,
-)
+from biogrip.judging.doubts import DOUBT, MANY, REJECTED, REJECTION, Note, compute_status
 from biogrip.judging.likelihood import Likelihood
 from biogrip.physics.noise import without
 from biogrip.physics.protocol import Course, superposed
 from biogrip.physics.residuals import Residuals
+
+NOT_LINEAR = "not linear"
+"""What the note on gains that differ is about."""
 
 # Most levels of which gains are told; steps with which gains settle.
 _MOST_LEVELS, _STEPS = 10, 8
