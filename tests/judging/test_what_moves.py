@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.command.words import error_in_words
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import fit_from, identify_from
 from biogrip.judging.diagnosis import Diagnosis, diagnose
+from biogrip.judging.what_moves import error_in_words
 from biogrip.judging.without_model import tell_without_model
 from biogrip.library import Sample, set_up, simulate
 from biogrip.physics.instruments import INSTRUMENTS

@@ -11,6 +11,7 @@ from biogrip import __version__
 from biogrip.digits import counted, instant, legible, plain, with_limits, with_unit, within_limits
 from biogrip.judging.doubts import DOUBT, DOUBTFUL, HARMLESS, OK, REJECTED, REJECTION
 from biogrip.judging.verdicts import FIT_REJECTED, NOT_DETERMINED
+from biogrip.judging.what_moves import LEAST_MOVE, error_in_words
 from biogrip.judging.without_model import BEYOND, EXPONENT, FLOW, LEVEL, LOSS
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.models import CANDIDATES
@@ -24,8 +25,6 @@ _SWEEPS = "oscillation"
 _LINES = 5
 # Most names of traces that are refused for what another one is.
 _MOST_NAMED = 5
-# Share of a quantity below which no error of the instrument is worth a line.
-_LEAST_MOVE = 1e-4
 _LIKELIHOOD_RATIO = "That they are of one sample was tested by two likelihood ratios (Bonferroni)."
 _NUMBER = re.compile(r"\d[\d.e+-]*")
 MEANS = {
@@ -105,15 +104,6 @@ def rows_of_moves(found: Mapping[str, Any]) -> list[tuple[str, dict[str, float]]
     return [*rows.items()]
 
 
-def error_in_words(by: float) -> str:
-    """Return how far a printed value is off; beyond a factor of two a linear estimate ends."""
-    if by > 1 or by < -0.5:
-        return f"as {'more than twice' if by > 0 else 'less than half'} what it is"
-    if abs(by) < _LEAST_MOVE:
-        return "right"
-    return f"{plain(100 * abs(by), 2)} % too {'low' if by < 0 else 'high'}"
-
-
 def moves_in_words(found: Mapping[str, Any]) -> list[str]:
     """Return a line on what a zero makes most wrong, and what is most wrong, by model and any."""
     rows, of_model = rows_of_moves(found), {each["quantity"] for each in found["quantities"]}
@@ -122,7 +112,7 @@ def moves_in_words(found: Mapping[str, Any]) -> list[str]:
         every = [(by, name, words) for words, row in some for name, by in row.items()]
         chosen = [each for each in every if (each[1] in of_model) == by_model]
         by, name, words = max(chosen, key=lambda it: abs(it[0]), default=(0.0, "", ""))
-        if abs(by) > _LEAST_MOVE:
+        if abs(by) > LEAST_MOVE:
             said[f"{name} is printed {error_in_words(by)} if {words}"] = None
     return [f"{'; '.join(said)}."] if said else []
 

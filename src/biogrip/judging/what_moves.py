@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from biogrip.arrays import Array
+from biogrip.digits import plain
 from biogrip.judging.likelihood import Likelihood
 from biogrip.judging.quantities import Quantity
 from biogrip.physics.protocol import is_storage, spacing_at
@@ -27,6 +28,9 @@ from biogrip.physics.residuals import Residuals
 # Error of a zero and of a gain, as a share; of a phase, in rad; last decimal of what they move, and
 # most e-folds.
 _WRONG_SHARE, _WRONG_PHASE, _DECIMALS, _MOST = 0.01, np.radians(1.0), 6, 10.0
+
+LEAST_MOVE = 1e-4
+"""Error of a quantity, over its value, below which it is not worth a line."""
 
 Response = Callable[[Residuals], Array]
 """What a sample shows, (n_samples,), under the protocol and at the times of residuals."""
@@ -120,3 +124,12 @@ def as_moves(mistakes: Sequence[Mistake], labels: Sequence[str], changes: Array)
         Move(mistake.name, mistake.words, {label: by for label, by in row if not math.isnan(by)})
         for mistake, row in zip(mistakes, rows, strict=True)
     ]
+
+
+def error_in_words(by: float) -> str:
+    """Return how far a printed value is off; beyond a factor of two a linear estimate ends."""
+    if by > 1 or by < -0.5:
+        return f"as {'more than twice' if by > 0 else 'less than half'} what it is"
+    if abs(by) < LEAST_MOVE:
+        return "right"
+    return f"{plain(100 * abs(by), 2)} % too {'low' if by < 0 else 'high'}"
