@@ -116,7 +116,7 @@ def rise(path: Path) -> list[str]:
     inside_s = np.minimum(time_s, 3.0)
     spring = 5 * (np.exp(-(time_s - inside_s) / 5) - np.exp(-time_s / 5)) / 3
     strain, stress = 0.02 * inside_s / 3, steady(0.02 * (400 * inside_s / 3 + 500 * spring))
-    columns = time_s, stress, strain, stress / np.maximum(strain, 1e-9)
+    columns: list[Array] = [time_s, stress, strain, stress / np.maximum(strain, 1e-9)]
     write_trace(path, *columns, header="time_s,stress_Pa,strain,modulus_Pa")
     return ["--reading", "modulus=modulus_Pa", "--from", "3.1", *RELAXATION]
 
@@ -129,7 +129,7 @@ def unit_of_hold(path: Path) -> list[str]:
 
 def grows(path: Path) -> list[str]:
     """Noise of 5 % of a relaxation by a factor of ten."""
-    readings = (40 + 500 * np.exp(-TIME_S / 5)) * (1 + 16 * (noisy(0 * TIME_S + 1) - 1))
+    readings: Array = (40 + 500 * np.exp(-TIME_S / 5)) * (1 + 16 * (noisy(0 * TIME_S + 1) - 1))
     write_trace(path, TIME_S, readings, header="time_s,modulus_Pa")
     return ["--reading", "modulus", *RELAXATION, "--start", "0"]
 
@@ -141,8 +141,8 @@ def other_model(path: Path) -> list[str]:
 
 def other_zero(path: Path) -> list[str]:
     """Two steps, which tell a zero from a sample; the first comes with the first row."""
-    time_s = np.arange(0.0, 30, 0.25)
-    load = np.where(time_s < 15.125, 5.0, 2.0)
+    time_s: Array = np.arange(0.0, 30, 0.25)
+    load: Array = np.where(time_s >= 15.125, 2.0, 5.0)
     compliance = [
         1 / 500 - np.expm1(-np.maximum(t, 0) / 5) / 400 for t in (time_s, time_s - 15.125)
     ]
@@ -243,11 +243,9 @@ def test_every_hint_of_the_source_is_of_a_kind() -> None:
             # Options themselves, their help, and how a notebook says them.
             continue
         tree = ast.parse(path.read_text())
-        documents = [
-            ast.get_docstring(node, clean=False)
-            for node in ast.walk(tree)
-            if isinstance(node, ast.AsyncFunctionDef | ast.FunctionDef | ast.ClassDef | ast.Module)
-        ]
+        documented = ast.Module, ast.ClassDef, ast.FunctionDef
+        bodies = [node for node in ast.walk(tree) if isinstance(node, documented)]
+        documents = [ast.get_docstring(node, clean=False) for node in bodies]
         for node in ast.walk(tree):
             text = getattr(node, "value", None)
             if not isinstance(node, ast.Constant) or not isinstance(text, str):
