@@ -1,5 +1,6 @@
 """The problem that all benchmarks share: noisy traces of the default study's cell."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -21,7 +22,7 @@ from biogrip.physics.sample_model import SampleModel
 from biogrip_study.config.study import Case, load_study
 from biogrip_study.methods.genetic import GeneticSettings
 from biogrip_study.methods.genome import Genome
-from biogrip_study.methods.misfit import Misfit, make_misfit
+from biogrip_study.methods.misfit import series_of
 
 CONFIG = Path(__file__).parents[1] / "config" / "config.yaml"
 BATCH = 25
@@ -70,11 +71,11 @@ class NoisyTrace:
     genome: Genome
     genetic: GeneticSettings
 
-    def misfit(self) -> Misfit:
+    def misfit(self) -> Callable[[Array], Array]:
         """Return the study's misfit of a population against the trace."""
         trace = CondensedTrace(self.trace_rad, _condensed())
         residuals = Residuals(self.gripper, self.model, self.steps, trace, instrument=GRIPPER)
-        return make_misfit(residuals)
+        return series_of([residuals]) or residuals.misfit
 
     def problem(self) -> TraceProblem:
         """Pose the identification as the study does."""

@@ -379,7 +379,7 @@ def identified_example() -> str:
         if not q["low"] <= PIPETTE_TRUTH[q["quantity"]] <= q["high"]
     ]
     every = f"Every interval but of {missed}" if missed else "Every interval"
-    return f"{told}\n\nThe true values are {made}. {every} holds its true value."
+    return f"{told}\n\nTrue are {made}. {every} holds its true value."
 
 
 def doubted_example() -> str:

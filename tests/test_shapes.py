@@ -63,7 +63,7 @@ def test_an_approach_and_its_dwell_tell_the_modulus_of_young(afm: Path) -> None:
 def test_a_tip_that_is_drawn_back_is_noted(afm: Path) -> None:
     _, said, _ = identify(afm, *APPROACH)
     assert "The contact shrinks from 30 s on" in said
-    assert "--until 30.\n" in said
+    assert "--until 29.9.\n" in said
 
 
 def test_a_force_that_is_held_tells_compliances(tmp_path: Path) -> None:

@@ -192,7 +192,7 @@ def test_a_trace_that_fails_is_a_row_that_says_why(here: Path) -> None:
         whole = [("gone.csv", "lost", "failed", True), ("usual.csv", "left", "ok", False)]
         row = ((it["trace"], it["dish"], it["fit"], it["failed"] != "") for it in listed())
         assert [*row] == whole[: few - 1]
-        assert "<td>lost</td>" in (here / "page.html").read_text()
+        assert '<td class="aside">lost</td>' in (here / "page.html").read_text()
 
 
 @pytest.mark.nightly

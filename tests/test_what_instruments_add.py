@@ -1,5 +1,6 @@
 """A zero, a rise, a contact, a share: by the command, of traces that are simulated by hand."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -143,6 +144,29 @@ def test_a_right_contact_is_not_doubted(tmp_path: Path) -> None:
     found = identified(tmp_path, trace, *SPHERE, "--model", "zener_maxwell", "--no-compare")
     assert found["fit"] == "ok"
     holds(found, k=1200.0, k_p=800.0, tau=3.0)
+
+
+@pytest.mark.parametrize("off_m", [0.0, -60e-9, pytest.param(60e-9, marks=pytest.mark.nightly)])
+def test_where_the_force_is_recorded_a_contact_is_named(tmp_path: Path, off_m: float) -> None:
+    """Depths of a sphere under a ramp of force, then a hold: the integral of the compliance."""
+    time_s = np.arange(0.2, 30, 0.2)
+    force_N = 4e-9 * np.minimum(time_s / 10, 1.0)
+    yielded = [
+        np.trapezoid(1 / 800 - np.expm1(-(t - s) / 3) / 1200, s) * 4e-10
+        for t, s in ((t, np.linspace(0, min(t, 10.0), 2001)) for t in time_s)
+    ]
+    depth_m = (9 / 16 / np.sqrt(RADIUS_M) * np.array(yielded)) ** (2 / 3)
+    read = depth_m - off_m + noise(len(time_s), 2e-9)
+    trace = write_trace(tmp_path / "creep.csv", time_s, read, force_N, header="time_s,d_m,F_N")
+    given = ("--reading", "displacement=d_m", "--load", "F_N", "--shape", "sphere 2.5 um")
+    found = identified(tmp_path, trace, *given, "--model", "zener_kelvin", "--no-compare")
+    said = [reason for reason in found["reasons"] if "The tip seems to touch" in reason]
+    assert bool(said) == bool(off_m), found["reasons"]
+    for reason in said:
+        assert f"nm {'before' if off_m > 0 else 'after'} the zero of its depth" in reason
+        assert "count its depths from there" in reason
+        (size,) = re.findall(r"about (\d+) nm", reason)
+        assert float(size) == pytest.approx(60, rel=0.5)
 
 
 def test_of_a_dwell_alone_nothing_tells_the_contact(tmp_path: Path) -> None:

@@ -235,8 +235,7 @@ def _add_design(commands: Any) -> None:
     design.set_defaults(command="biogrip.design:design")
     design.examples = ("design my.yaml", "design my.yaml --output designed.yaml")
     design.cost = "The search takes less than a minute."
-    text = "YAML file with your samples"
-    design.add_argument("config", type=Path, help=text)
+    design.add_argument("config", type=Path, help="YAML file with your samples")
     text = "config of the designed study, YAML [CONFIG_designed.yaml]"
     _add_file(design, "--output", "OUTPUT", text)
 

@@ -6,9 +6,11 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
 from typing import Any
+from urllib.request import Request, urlopen
 
 import numpy as np
 import pytest
@@ -35,19 +37,25 @@ TOKEN = "token"
 expect.set_options(timeout=60_000)
 
 
-@pytest.fixture(scope="module")
-def address() -> Iterator[str]:
-    """Of the command as it is typed; what it kept goes when it is stopped."""
+@contextmanager
+def served() -> Iterator[tuple[str, int]]:
+    """The address of the command as it is typed, and its process; what it keeps goes with it."""
     command = [sys.executable, "-m", "biogrip", "app", "--no-browser"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
         assert server.stdout
         place = server.stdout.readline().strip()
         assert re.fullmatch(r"http://127\.0\.0\.1:\d+/[\w-]{32}/", place)
         kept = [*Path("/tmp").glob("biogrip_*")]
-        yield place
+        yield place, server.pid
         server.send_signal(signal.SIGINT)
         assert server.wait(20) == 0
     assert any(not folder.exists() for folder in kept)
+
+
+@pytest.fixture(scope="module")
+def address() -> Iterator[str]:
+    with served() as (place, _):
+        yield place
 
 
 @pytest.fixture
@@ -210,6 +218,7 @@ def test_what_is_missing_or_stopped_is_told_and_mended_in_place(
     expect(window.locator("#files")).to_contain_text("clock, in ms")
     choose(window, {"model": "generalized_maxwell_2"})
     window.click("text=Identify >> nth=-1")
+    expect(window.locator("#result [role=status]")).to_contain_text(re.compile("for [2-9] s"))
     window.click("text=Stop >> nth=-1")
     expect(window.locator("#result [role=alert]")).to_contain_text("no file was left half-written")
     expect(window.locator("iframe")).to_have_count(0)
@@ -287,6 +296,21 @@ def test_who_sends_too_much_is_refused(client: FlaskClient) -> None:
 
 
 @pytest.mark.nightly
+def test_what_runs_ends_with_the_program() -> None:
+    with served() as (place, server):
+        with urlopen(place) as page:
+            window = page.url
+        for action, do in (("example", "the gripper"), ("start", "")):
+            origin = {"Origin": place[:-34]}
+            with urlopen(Request(f"{window}{action}", f"do={do}".encode(), origin)) as sent:
+                assert sent.status == 200
+        tasks = Path(f"/proc/{server}/task").iterdir()
+        (command,) = " ".join((task / "children").read_text() for task in tasks).split()
+        assert Path(f"/proc/{command}").exists()
+    assert not Path(f"/proc/{command}").exists()
+
+
+@pytest.mark.nightly
 def test_a_command_that_takes_too_long_is_stopped(
     client: FlaskClient, windows: dict[str, Window], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -296,7 +320,7 @@ def test_a_command_that_takes_too_long_is_stopped(
     post(client, "start")
     work = windows["one"].work
     assert work
-    assert work.wait(60) == 128 + signal.SIGINT
+    assert work.wait(60) == 128 + signal.SIGTERM
     assert "no file was left half-written" in post(client, "show")
 
 
@@ -398,6 +422,30 @@ def test_columns_are_chosen_by_their_names(file: str, typed: str) -> None:
     sheet, (table,) = overview(DATA / file)
     chosen = dict.fromkeys(CHOICES, "") | likely_choices(numbers_in(sheet, table))
     assert options_typed(chosen) == shlex.split(typed)
+
+
+@pytest.mark.parametrize(
+    ("text", "names", "blocks", "last"),
+    [
+        ("Zeit;Weg\ns;mm\n0,5;1,25\n1;1,5\n1,5;2\n", ["Zeit", "Weg"], 1, [1.5, 2.0]),
+        ("1 2\n2 3\n3 5\n", ["1", "2"], 1, [3.0, 5.0]),
+        ("# t (s) F (nN)\n1 2\n2 3\n3 5\n", ["t (s)", "F (nN)"], 1, [3.0, 5.0]),
+        ("a,b\n1,2\n2,3\n\na,b\n1,7\n2,8\n3,9\n", ["a", "b"], 2, [3.0, 9.0]),
+        ("t,x\n10:00:01,1\n10:00:02,NA\n10:00:03,4\n", ["t", "x"], 1, [36003.0, 4.0]),
+    ],
+)
+def test_a_file_is_shown_before_its_columns_are_said(
+    tmp_path: Path, text: str, names: list[str], blocks: int, last: list[float]
+) -> None:
+    (tmp_path / "a.txt").write_text(text)
+    window = Window(tmp_path, names=["a.txt"])
+    window.look()
+    assert window.table
+    assert window.sheet
+    numbers = numbers_in(window.sheet, window.table)
+    assert [*numbers] == [*window.points] == names
+    assert [column[-1] for column in numbers.values()] == last
+    assert len(window.tables) == blocks
 
 
 def test_every_model_is_drawn_with_its_elements() -> None:

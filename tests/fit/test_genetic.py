@@ -19,7 +19,7 @@ from biogrip_study.methods.genome import (
     lowest_encodable,
     nearest_encodable,
 )
-from biogrip_study.methods.misfit import make_misfit
+from biogrip_study.methods.misfit import series_of
 from tests.helpers.problems import clean, pose_noisy
 
 SMALL = GeneticSettings(60, 30, "pairs", "once", 3, 0.5, 1, 4, 6, 25)
@@ -77,7 +77,8 @@ def decoded(genome: Genome, chromosomes: IntArray) -> Array:
 
 def gene_by_gene(posed: TraceProblem, settings: GeneticSettings, rng: np.random.Generator) -> Fit:
     """One population by itself, in single precision; of equals the lowest genes are first."""
-    misfit, genome = make_misfit(posed.residuals), Genome(posed.ranges)
+    misfit = series_of([posed.residuals]) or posed.residuals.misfit
+    genome = Genome(posed.ranges)
 
     def ranked(everyone: IntArray) -> tuple[IntArray, Array]:
         ranking = misfit(decoded(genome, everyone)).astype(np.float32)

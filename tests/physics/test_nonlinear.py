@@ -15,8 +15,7 @@ from biogrip.physics.models import MODELS, generalized_maxwell
 from biogrip.physics.protocol import Course, Phase, evaluate, hold, join_phases
 from biogrip.physics.response import step_response, superpose
 from biogrip.physics.simulation import compute_grip
-from biogrip_study.gripper.nonlinear import correction, nonlinear_rotation
-from biogrip_study.gripper.simulation import jaw_force
+from biogrip_study.gripper.nonlinear import correction, jaw_force, nonlinear_rotation
 from tests.helpers.responses import random_samples
 
 ARM = Arm(1.0e-14, 3.3e-12, 4.4e-7)

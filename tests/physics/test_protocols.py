@@ -28,8 +28,8 @@ from biogrip.physics.protocol import (
 )
 from biogrip.physics.response import phi_functions, step_response, superpose
 from biogrip.physics.roots import SMALLEST_GAP, separate
-from biogrip_study.gripper.simulation import jaw_force
-from biogrip_study.methods.misfit import SeriesMisfit, make_misfit
+from biogrip_study.gripper.nonlinear import jaw_force
+from biogrip_study.methods.misfit import SeriesMisfit, series_of
 from tests.helpers.responses import exact_50_digits, random_samples
 from tests.physics.test_contact import TABLE_2
 
@@ -83,7 +83,7 @@ def test_no_response_is_needed_of_steps_that_are_sampled_evenly(gripper: Gripper
     ):
         experiment = replace(set_up(gripper, phases, Sample(name)), offset=offset)
         residuals = experiment.of(time_s, np.zeros_like(time_s)).residuals
-        misfit = make_misfit(residuals)
+        misfit = series_of([residuals]) or residuals.misfit
         assert isinstance(misfit, SeriesMisfit) == by_series
         assert by_series or misfit == residuals.misfit
 

@@ -8,7 +8,7 @@ from biogrip.physics import models
 from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.protocol import Course, Phase, evaluate, hold, join_phases
 from biogrip.physics.response import step_response, superpose
-from biogrip_study.gripper.simulation import jaw_force
+from biogrip_study.gripper.nonlinear import jaw_force
 from biogrip_study.gripper.unilateral import (
     UnilateralResponse,
     _after,

@@ -59,7 +59,7 @@ def test_what_cannot_be_read_is_said_in_one_line(tmp_path: Path) -> None:
 def test_text_in_a_column_of_numbers_is_refused(tmp_path: Path) -> None:
     """In one, too, that not all files of its kind have."""
     write_rows(tmp_path / "a.csv", ("name", "value", "more"), [["a", 1, "1.0.5"]])
-    with pytest.raises(BiogripError, match=r"a.csv: more: not all are numbers"):
+    with pytest.raises(BiogripError, match=r"a.csv: cannot be read as rows: .*1\.0\.5"):
         RowFile("rows", ("name", "value"), ("name",)).read(tmp_path / "a.csv")
 
 

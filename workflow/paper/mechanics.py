@@ -29,8 +29,7 @@ from biogrip.physics.response import LEFT, RIGHT, step_response, superpose
 from biogrip.physics.sample_model import Network
 from biogrip.physics.simulation import compute_grip, simulated_response
 from biogrip_study.config.study import Case, Study
-from biogrip_study.gripper.nonlinear import nonlinear_rotation
-from biogrip_study.gripper.simulation import jaw_force, target_grip
+from biogrip_study.gripper.nonlinear import jaw_force, nonlinear_rotation, target_grip
 from biogrip_study.gripper.unilateral import unilateral_response
 from biogrip_study.stages.job import job_study, logged
 from biogrip_study.tables.layout import Column, Row, ShownTable, titled, write

@@ -18,7 +18,7 @@ from biogrip.levels import DETERMINED_PERCENT
 from biogrip.physics.noise import standard_deviation
 from biogrip.physics.simulation import compute_grip, simulated_response
 from biogrip_study.config.study import Case, Study
-from biogrip_study.gripper.simulation import jaw_force
+from biogrip_study.gripper.nonlinear import jaw_force
 from biogrip_study.records.identifications import read_batch, share_with_limits
 from biogrip_study.stages.job import job_study, logged, paths
 from biogrip_study.tables.layout import Column, Row, ShownTable, titled, write

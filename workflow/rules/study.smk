@@ -61,7 +61,6 @@ rule recording:
 rule calibration:
     output:
         gripper="results/calibrations/{case}.yaml",
-        records="results/calibrations/{case}.npz",
     log:
         "results/logs/calibration/{case}.log",
     wildcard_constraints:

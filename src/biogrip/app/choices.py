@@ -30,7 +30,7 @@ _OF_TIME, _OF_SWEEPS = {"time", "hold", "load", "ramp", "contact", "start", "off
 _TAKES_VALUE = {name: bool(metavar) for of in GROUPS.values() for name, metavar, *_ in of}
 _TAKES_VALUE |= {"--no-offset": False, "--no-drift": False, "--no-compare": False}
 _OPTION = re.compile(r"(--[a-z-]+)(?: ((?:'[^']*'|\"[^\"]*\"|[^\s'\"])+?))?(?=[.,;:)]*(?:\s|$))")
-_PLACEHOLDER = re.compile(r"(^|=)[A-Z]+$|^(and|or)$")
+_PLACEHOLDER, _QUOTED = re.compile(r"(^|=)[A-Z]+$|^(and|or)$"), re.compile("'(.*?)'|\"(.*?)\"")
 _UNITS_ALLOWED = re.compile(r"allowed are ([^.;:]+?)(?:, or |, by |[.;]|$)")
 
 
@@ -45,8 +45,8 @@ def likely_choices(numbers: Mapping[str, Array]) -> dict[str, str]:
         likely = (own for own, pattern in KNOWN["words"].items() if re.search(pattern, words))
         columns.setdefault(next(likely, "other"), name)
     read = [it for name, it in INSTRUMENTS.items() if name in columns]
-    likely_one = max(read, key=lambda it: it.sweeps + it.relative, default=INSTRUMENTS["strain"])
-    reading, load = likely_one.read.name, likely_one.controlled.name * (not likely_one.relative)
+    instrument = max(read, key=lambda it: it.sweeps + it.relative, default=INSTRUMENTS["strain"])
+    reading, load = instrument.read.name, instrument.controlled.name * (not instrument.relative)
     if {load, reading} <= {*columns}:
         load, reading = sorted((load, reading), key=lambda name: _steps(numbers[columns[name]]))
     partner = next((name for name in PARTNERS if name in columns), "")
@@ -97,7 +97,7 @@ def remedies_in(message: str) -> dict[tuple[str, str], str]:
     remedies: dict[tuple[str, str], str] = {}
     for option, written in _OPTION.findall(message):
         takes = _TAKES_VALUE.get(option)
-        value = "".join(shlex.split(written)) if takes else ""
+        value = _QUOTED.sub(r"\1\2", written) if takes else ""
         if value.endswith("=UNIT") and (units := _UNITS_ALLOWED.search(message)):
             for unit in re.split(", | or ", units[1]):
                 remedies[option, value.replace("UNIT", unit)] = unit

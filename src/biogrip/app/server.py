@@ -43,9 +43,10 @@ _SHOWN = {
 
 def open_app(port: int = 0, *, no_browser: bool = False) -> None:
     """Serve the window until it is stopped, and open it in a browser; print its address."""
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        # So that what is temporary goes, too.
-        signal.signal(number, lambda *_: sys.exit())
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+        # So that what is temporary goes, too. Windows has no SIGHUP.
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), lambda *_: sys.exit())
     with TemporaryDirectory(prefix="biogrip_") as folder:
         windows = defaultdict[str, Window](lambda: Window(Path(mkdtemp(dir=folder))))
         app = app_of(windows, token := secrets.token_urlsafe(24))

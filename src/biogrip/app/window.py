@@ -109,8 +109,9 @@ class Window:
             self.look()
             self.command = join(["biogrip", *self.typed]) + " --report page.html --csv table.csv"
             self.traces = self._traces()
-            check_settings(self.traces[:_CHECKED])
-            self.recording, _ = read_trace(self.traces[0])
+            there = [own for own in self.traces if own.trace.is_file()]
+            check_settings(there[:_CHECKED])
+            self.recording = read_trace(there[0])[0] if there else None
         except BiogripError as error:
             self.problem = self.shown(error)
 
@@ -153,14 +154,14 @@ class Window:
         command = [sys.executable, "-m", "biogrip", *self.typed, *outputs[: 3 - self.of_table]]
         with (self.out / "stdout").open("wb") as stdout, (self.out / "stderr").open("wb") as stderr:
             self.work = subprocess.Popen(command, cwd=self.folder, stdout=stdout, stderr=stderr)
-        limit = Timer(LONGEST_S, self.work.send_signal, [signal.SIGINT])
+        limit = Timer(LONGEST_S, self.work.send_signal, [signal.SIGTERM])
         limit.daemon = True
         limit.start()
 
     def stop(self) -> None:
-        """Stop the command as its user would in a terminal, and wait for its end."""
+        """Stop the command, which leaves no file half-written, and wait for its end."""
         if self.work and self.running_s:
-            self.work.send_signal(signal.SIGINT)
+            self.work.send_signal(signal.SIGTERM)
             self.work.wait()
 
     def said(self, stream: str) -> str:

@@ -56,12 +56,12 @@ def _shrinks(recording: Recording, case: SampleCase) -> tuple[str, ...]:
         return ()
     time_s, loads = recording.load[recording.load[:, 0] <= recording.form["last_s"]].T
     most = np.maximum.accumulate(loads)
-    falls = time_s[(most > 0.1 * most[-1]) & (loads < _STAYS * most)]
+    falls = np.flatnonzero((most > 0.1 * most[-1]) & (loads < _STAYS * most))
     if not len(falls):
         return ()
     return (
-        f"The contact shrinks from {falls[0]:g} s on: what is said holds while it grows or stays. "
-        f"Leave these readings out: --until {falls[0]:g}.",
+        f"The contact shrinks from {time_s[falls[0]]:g} s on: what is said holds while it grows or "
+        f"stays. Leave these readings out: --until {time_s[falls[0] - 1]:g}.",
     )
 
 

@@ -195,7 +195,8 @@ def read_trace(asked: Asked) -> tuple[Recording, SampleCase]:
     columns = ByOptions(**vars(case.block.measurement))
     # What its protocol follows from was read before the protocol's start was known.
     recording = replace(recording, read=columns) if recording else asked.read(columns)
-    return replace(recording, remarks_before=remarks_on_hold(recording, case, asked.given)), case
+    said = (*recording.remarks_before, *remarks_on_hold(recording, case, asked.given))
+    return replace(recording, remarks_before=said), case
 
 
 def case_of(asked: Asked) -> tuple[SampleCase, Recording | None]:

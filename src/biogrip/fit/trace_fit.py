@@ -159,8 +159,8 @@ def _thinned(count: int) -> IntArray:
 
 
 _MOST_ROUNDS = 5
-# Numbers in functions of errors of a load that have their own; rows and readings looked at; lags of
-# the response to a ramp; how long a step lasts, over the time from row to row.
+# Numbers in the functions of errors of a load that have their own; rows and readings that are
+# looked at; lags of the response to a ramp; how long a step lasts, over the time from row to row.
 _MOST_NUMBERS, _ROWS_SHOWN, _LAGS, _STEEP = 3_000_000, 3000, 1000, 1e-6
 # Step of differences, as a share of the largest depth; size of a free function over the noise.
 _OF_DEPTH, _FREE_OVER_NOISE = 1e-3, 1e5

@@ -77,31 +77,43 @@ def _fitted(guess: Experiment, time_s: Array, readings: Array) -> float:
     return guess.deeper + depth * float(fit.x[-1])
 
 
-def depth_off(diagnosis: Diagnosis) -> tuple[float, float]:
-    """Return by how much a tip would be deeper than it was taken to be, to first order, and its sd.
+def depth_off(diagnosis: Diagnosis) -> tuple[float, float, float]:
+    """Return by how much a tip would be deeper than it was taken to be, to first order.
 
-    It is that which what the fit leaves, in white noise, tells beside the sample's parameters.
+    It is that which what the fit leaves, in white noise, tells beside the sample's parameters. Also
+    returned are how much a unit of it shows, as a norm, and the misfit with it over the scatter.
     """
     recording, experiment = diagnosis.identified
     likelihood, exact = diagnosis.likelihood, experiment.to_identify()
-    residuals = exact.of(recording.time_s, recording.readings).residuals
+    residuals, read = (
+        exact.of(recording.time_s, recording.readings).residuals,
+        recording.read.instrument.read,
+    )
     left, slopes = residuals(likelihood.best)
-    change = contact_function(exact, recording.time_s, np.exp(likelihood.best))
+    if experiment.tip_power is None:
+        # A depth that is read is less by what the tip is deeper.
+        change = -read.slope(np.abs(residuals.response(likelihood.best)) ** (1 / read.power))
+    else:
+        change = contact_function(exact, recording.time_s, np.exp(likelihood.best))
     change = residuals.trace.condensed.cleared(change)
     basis = absorbed(np.vstack((slopes, residuals.trace.condensed.taken)))
     alone = without(basis, change)
     told = float(alone @ alone)
     if told <= levels.CONSTANT_OF_PEAK**2 * float(change @ change):
-        return 0.0, np.inf
-    return -float(alone @ left) / told, likelihood.noise_sd / float(np.sqrt(told))
+        return 0.0, 0.0, np.inf
+    deeper = -float(alone @ left) / told
+    rest = float(np.std(left + deeper * alone)) / residuals.noise_scale
+    return deeper, float(np.sqrt(told)), rest
 
 
 def depth_limits(diagnosis: Diagnosis) -> tuple[float, float, float]:
     """Return by how much a tip is deeper than recorded, in m, and its limits."""
     recording, experiment = diagnosis.identified
-    _, sd = depth_off(diagnosis)
+    _, shown, _ = depth_off(diagnosis)
     freedom = min(diagnosis.likelihood.freedom, 1e9)
-    room = sd * float(stdtrit(freedom, 0.5 + diagnosis.likelihood.confidence / 2))
+    room = np.divide(diagnosis.likelihood.noise_sd, shown) * float(
+        stdtrit(freedom, 0.5 + diagnosis.likelihood.confidence / 2)
+    )
     unit = recording.read.instrument.controlled.units["m"]
     middle = experiment.deeper
     return middle / unit, (middle - room) / unit, (middle + room) / unit
@@ -110,13 +122,21 @@ def depth_limits(diagnosis: Diagnosis) -> tuple[float, float, float]:
 def notes_on_contact(diagnosis: Diagnosis) -> Iterator[Note]:
     """Yield a doubt if what a fit leaves follows the derivative by the contact, which was given."""
     recording, experiment = diagnosis.identified
-    if experiment.tip_power is None or experiment.fit_contact:
+    instrument, how = recording.read.instrument, "say --contact fit"
+    depth = instrument.controlled
+    if experiment.tip_power is None:
+        depth, how = instrument.read, "count its depths from there"
+    if depth.power == 1 or experiment.fit_contact:
         return
-    deeper, sd = depth_off(diagnosis)
-    if (deeper / sd) ** 2 < chdtri(1, levels.FALSE_ALARM):
+    deeper, shown, rest = depth_off(diagnosis)
+    noise_sd = diagnosis.likelihood.noise_sd
+    if rest < levels.WHITE:
+        # All that is no noise is of the contact.
+        noise_sd = min(noise_sd, rest * diagnosis.likelihood.problem.residuals.noise_scale)
+    if (deeper * shown / noise_sd) ** 2 < chdtri(1, levels.FALSE_ALARM):
         return
-    size_nm = 1e9 * abs(deeper) / recording.read.instrument.controlled.units["m"]
+    size_nm = 1e9 * abs(deeper) / depth.units["m"]
     side = "before" if deeper > 0 else "after"
     text = f"The tip seems to touch about {plain(size_nm, 2)} nm {side} the zero of its depth"
     rejected = diagnosis.status == REJECTED
-    yield Note(REJECTION if rejected else DOUBT, f"{text}: say --contact fit.")
+    yield Note(REJECTION if rejected else DOUBT, f"{text}: {how}.")

@@ -122,7 +122,7 @@ def _notes_on_trace(
         return
     yield from notes_on_gains(judged.likelihood, judged.notes)
     start: list[Note] = []
-    if experiment.tip_power is not None:
+    if recording.read.has_tip:
         # Imported here: most traces are of no tip.
         from biogrip.identify.contact import notes_on_contact
 

@@ -1,6 +1,6 @@
 """Reader of recorded traces in the user's own files, with gaps, units and line numbers."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import isfinite
 from pathlib import Path
@@ -9,13 +9,14 @@ from typing import Any
 
 import numpy as np
 
+import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.digits import counted, plain
 from biogrip.errors import BiogripError, nearest
 from biogrip.physics.instruments import INSTRUMENTS, PHASE, ROTATION, VISCOSITY
 from biogrip.physics.protocol import joined
 from biogrip.terminal import visible
-from biogrip.traces.columns import AXES, listed, place, shortened, unit_of
+from biogrip.traces.columns import AXES, listed, place, plain_name, shortened, unit_of
 from biogrip.traces.measurement_block import UNREAD, MeasurementBlock
 from biogrip.traces.tables import (
     BLANKS,
@@ -221,6 +222,8 @@ def read_recording(path: Path, columns: MeasurementBlock) -> Recording:
         **(_signs_of_a_cut(sheet, tables[-1]) if max(places) + 1 == len(tables) else {}),
     }
     form = {key: value for key, value in form.items() if value is not None}
+    if load is None and not columns.instrument.has_jaws and len(parts) == 1:
+        remarks += tuple(_about_rise(sheet, table, parts[0], columns))
     return replace(recording, form=form, load=load, remarks_before=remarks)
 
 
@@ -240,6 +243,28 @@ class _TablePart:
     """True for rows to use, (n_rows,)."""
     form: dict[str, Any]
     """What marks the numbers have."""
+
+
+def _about_rise(
+    sheet: Sheet, table: Table, part: _TablePart, columns: MeasurementBlock
+) -> Iterator[str]:
+    """Yield a sentence if a column that is not read has a load that rises before it is held."""
+    controlled, read = columns.instrument.controlled.name, columns.instrument.read.name
+    used = columns.named.values()
+    for index, name in enumerate(table.names):
+        if name in used or not plain_name(name).lower().startswith(controlled):
+            continue
+        cells = sheet.cells[table.first : table.end, index][part.chosen].tolist()
+        loads = np.array([number_or_inf(cell.replace(",", ".")) for cell in cells])
+        level = np.median(loads[len(loads) // 2 :])
+        away = np.abs(loads - level) > levels.SAME_SHARE * abs(level)
+        rising = np.flatnonzero(away & (np.abs(loads) > levels.SAME_SHARE * abs(level)))
+        after = int(rising[-1]) + 1 if len(rising) > 1 else len(loads)
+        if after > len(loads) // 2 or np.any(np.diff(np.abs(loads[: after + 1])) < 0):
+            continue
+        until = f"{part.values[part.chosen, 0][after]:g} {part.units[0]}"
+        instead = {"modulus": "stress", "compliance": "strain"}.get(read, read)
+        yield f"{name} rises until {until}: read {instead} with --load {quote(name)}."
 
 
 def _read_block(path: Path, sheet: Sheet, table: Table, columns: MeasurementBlock) -> _TablePart:

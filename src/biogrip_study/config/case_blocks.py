@@ -1,4 +1,4 @@
-"""Config blocks of a case, and those that a study sets for all cases.
+"""Config blocks of a case, what the paper reports of it, and those that a study sets for all.
 
 A case has all blocks of the study, merged with its own. Beside the bounds of single keys, its
 blocks must fit each other: protocol and readings to the instrument, true values to what is
@@ -6,7 +6,7 @@ searched, sampling to the protocol.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, dataclass, field, fields, make_dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -17,11 +17,11 @@ from biogrip.config.source import overlaid
 from biogrip.config.trace_blocks import ExperimentBlocks, IntervalBlock, SampleBlocks
 from biogrip.digits import counted
 from biogrip.fit.problem import GeneRange
-from biogrip.keys import BY_KIND, Block, Complaint, Printed, below, plain
+from biogrip.keys import BY_KIND, Block, Complaint, OneOf, Printed, below, plain
 from biogrip.physics.fractional import LONGEST_S, SHORTEST_S
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.noise import MOST_SAMPLES
-from biogrip_study.config.published import Published
+from biogrip.physics.sample_model import SINGLE_BRANCH
 from biogrip_study.gripper.calibration import CalibrationTest
 from biogrip_study.methods.registry import METHODS
 
@@ -32,6 +32,41 @@ _MOST_SAMPLES_OF_TRACE = 10_000_000
 _AnyGripper = Annotated[
     Annotated[dict[str, Any], Tag("a block of keys")] | Annotated[str, Tag("text")], BY_KIND
 ]
+
+
+_Parameter = Annotated[str, OneOf(tuple(parameter.name for parameter in SINGLE_BRANCH))]
+_PrintedError = Annotated[
+    str,
+    Field(
+        pattern=r"^[<>]?[+-]?[0-9]{1,6}(\.[0-9]{1,3})?$",
+        json_schema_extra={
+            "form": "a number of at most 12 characters, with < or > before it where the paper has "
+            "it"
+        },
+    ),
+]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Published(Block):
+    """Results of the paper for a sample, to compare with."""
+
+    table: Annotated[int | None, Field(ge=1, le=1000)]
+    """Number of the paper's table."""
+    figure: Annotated[int | None, Field(ge=1, le=1000)] = None
+    """Number of the paper's figure of the fit."""
+    axis_rad: Annotated[
+        tuple[Annotated[float, Field(ge=-10, le=10)], ...], Field(min_length=2, max_length=2)
+    ] = ()
+    """Ends of the rotation axis of the paper's figure."""
+    identified: Mapping[_Parameter, Annotated[float, Field(ge=0, le=1e12)]]
+    """Identified parameters as printed, SI units."""
+    error_percent: Mapping[_Parameter, _PrintedError]
+    """Their errors in percent as printed, in quotes, for some are no numbers."""
+
+
+UNPUBLISHED = Published(table=None, identified={}, error_percent={})
+"""Record of a sample that the paper does not have."""
 
 
 @dataclass(frozen=True)

@@ -20,8 +20,7 @@ from biogrip.keys import Complaint, below, built, plain
 from biogrip.physics.gripper import CombDrive, Gripper
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.protocol import Phase
-from biogrip_study.config.case_blocks import OVERRIDABLE, CaseBlock
-from biogrip_study.config.published import UNPUBLISHED, Published
+from biogrip_study.config.case_blocks import OVERRIDABLE, UNPUBLISHED, CaseBlock, Published
 from biogrip_study.config.shipped import default_config
 from biogrip_study.config.study_blocks import StudyConfig, list_points, point_blocks
 from biogrip_study.gripper.calibration import with_calibration

@@ -14,7 +14,7 @@ from biogrip.figures import style
 from biogrip.figures.fit import FittedTrace, draw_fit, fit_of, scale_of
 from biogrip.figures.likelihood import draw_profiles_of
 from biogrip_study.config.study import Case
-from biogrip_study.gripper.simulation import jaw_force
+from biogrip_study.gripper.nonlinear import jaw_force
 from biogrip_study.gripper.unilateral import unilateral_response
 from biogrip_study.records.identifications import ALL, basins, read_identifications, read_verdicts
 from biogrip_study.records.rows import seeds_of

@@ -36,23 +36,18 @@ def _runs(
     """
     method = case.study.shown_method.name
     identified = records.read_identifications(identifications, case, method)
-    looks = {
-        int(run["seed"]): {"color": color, "linewidth": 1.5, "zorder": 3, "label": words}
-        for (words, run), color in zip(
-            first_of_basins(identified, case).items(), style.RUNS, strict=False
-        )
-    }
+    looks: dict[int, dict[str, Any]] = {}
+    runs = first_of_basins(identified, case).items()
+    for (words, run), color in zip(runs, style.RUNS, strict=False):
+        look = {"color": color, "linewidth": 1.5, "zorder": 3, "label": words}
+        looks[int(run["seed"])] = look
     histories = records.read_histories(history, method, values)
     drawn = histories["seed"].isin({*range(SHOWN_SEEDS), *looks})
     return identified, histories[drawn], looks
 
 
 def _draw_seeds(
-    axes: Axes,
-    histories: pd.DataFrame,
-    column: str,
-    seeds: int,
-    looks: Mapping[int, dict[str, Any]],
+    axes: Axes, histories: pd.DataFrame, column: str, seeds: int, looks: Mapping[int, Any]
 ) -> None:
     """Draw a column over generations, a line a seed."""
     if seeds > 1:
@@ -68,7 +63,7 @@ def draw_convergence(case: Case, identifications: Path, history: Path) -> Figure
     identified, histories, looks = _runs(case, identifications, history, ["best_misfit"])
     noise = identified.set_index("seed")["noise_rms"]
     noisy = bool((noise > 0).all())
-    unit = noise if noisy else noise.where(noise < 0, identified["misfit"].min())
+    unit = noise if noisy else pd.Series(identified["misfit"].min(), index=noise.index)
     drawn = style.figure(style.COLUMN_IN, 2.9)
     axes = drawn.subplots()
     excess = 100 * (histories["best_misfit"] / histories["seed"].map(unit) - 1)

@@ -52,15 +52,13 @@ def draw_overview(
         scatter.tick_params(labelleft=index == 0)
         style.panel(scatter, "bcd"[index], case.title, most_letters=_TITLE_LETTERS)
     axes[1].set_ylabel("identified / target")
-    drawn.legend(
-        *axes[1].get_legend_handles_labels(),
-        loc="outside lower right",
-        ncols=5,
-        markerscale=2.5,
-        title=case_fit.seeds_in_words(len(identified))
-        if len(identified) > case_fit.SHOWN_SEEDS
-        else None,
-    )
+    # Not every case is the paper's.
+    entries = [scatter.get_legend_handles_labels() for scatter in axes[1:]]
+    handles, labels = max(entries, key=lambda entry: len(entry[1]))
+    few = len(identified) > case_fit.SHOWN_SEEDS
+    title = case_fit.seeds_in_words(len(identified)) if few else None
+    place: dict[str, Any] = {"loc": "outside lower right", "ncols": 5, "markerscale": 2.5}
+    drawn.legend(handles, labels, title=title, **place)
     return drawn
 
 

@@ -11,6 +11,9 @@ which is small, of second order in the rotation. It is found by repeated substit
 an implicit collocation (Radau IIA, five stages [1]_) of uncoupled linear modes on a mesh graded
 towards the torque's jumps, for all samples at once. Inertia acts on the linear part alone.
 
+The force of the jaws is F_linear + g - (c u' + k u)/b_0^2, with u the correction: all of second
+order, no large terms cancel.
+
 References
 ----------
 .. [1] E. Hairer and G. Wanner, Solving Ordinary Differential Equations II, Springer, 1996, IV.5.
@@ -27,8 +30,15 @@ from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.errors import BiogripError
 from biogrip.physics.gripper import Arm, Gripper, rotation_of_tip
 from biogrip.physics.protocol import Course, evaluate
-from biogrip.physics.response import LEFT, step_response, superpose, weights_of_loads
+from biogrip.physics.response import (
+    LEFT,
+    linear_jaw_force,
+    step_response,
+    superpose,
+    weights_of_loads,
+)
 from biogrip.physics.sample_model import Network
+from biogrip.physics.simulation import Grip, extreme_forces
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
@@ -75,19 +85,92 @@ class Correction:
 def nonlinear_rotation(
     gripper: Gripper, network: Network, torque: Course, time_s: Array, arm: int = LEFT
 ) -> Array:
-    """Compute the closing rotation of an arm in rad, (n, n_times), by the nonlinear model.
+    """Compute the closing rotation of an arm by the nonlinear model.
 
-    A torque that closes the arms beyond what the model describes is a `BiogripError`.
+    Parameters
+    ----------
+    gripper, network, torque
+        Arms, n samples, and protocol of both arms.
+    time_s
+        Ascending, (n_times,).
+    arm
+        The left or the right arm.
+
+    Returns
+    -------
+    Array
+        Rotation in rad, (n, n_times).
+
+    Raises
+    ------
+    BiogripError
+        If the torque closes the arms beyond what the model describes.
     """
     beyond_linear = correction(gripper, network, torque).checked()
     linear = step_response(gripper, network)
     return superpose(linear, torque, time_s, arm) + beyond_linear.at(time_s, arm)
 
 
+def jaw_force(
+    gripper: Gripper,
+    network: Network,
+    course: Course,
+    time_s: Array,
+    *,
+    nonlinear: bool,
+    inertia: bool = True,
+) -> Array:
+    """Compute the jaws' force on the sample by either model.
+
+    Parameters
+    ----------
+    gripper, network, course
+        Arms, n samples, and protocol of both arms.
+    time_s
+        Ascending, (n_times,); at the instant of a step: what follows it.
+    nonlinear
+        By the nonlinear model, which has the errors of `nonlinear_rotation`.
+    inertia
+        With the inertia of the arms; without, the force may jump.
+
+    Returns
+    -------
+    Array
+        Force in N, positive while the jaws press, (n, n_times).
+    """
+    force = linear_jaw_force(gripper, network, course, time_s, inertia=inertia)
+    if nonlinear:
+        # Arms with inertia have not moved yet at the instant of a step.
+        instants = np.nextafter(time_s, -np.inf) if inertia else time_s
+        force += correction(gripper, network, course).checked().force_at(instants)
+    return force
+
+
+def target_grip(gripper: Gripper, network: Network, course: Course, *, nonlinear: bool) -> Grip:
+    """Compute the extreme forces of the jaws on the first sample, without inertia."""
+    given = gripper, network, course
+    return extreme_forces(
+        lambda time_s: jaw_force(*given, time_s, nonlinear=nonlinear, inertia=False)[0], course
+    )
+
+
 def correction(
     gripper: Gripper, network: Network, torque: Course, factors: Array | None = None
 ) -> Correction:
-    """Compute nonlinear minus linear rotation of samples, with factors on their torques, (n,)."""
+    """Compute nonlinear minus linear rotation and jaw force of samples.
+
+    Parameters
+    ----------
+    gripper, network, torque
+        Arms, n samples, and protocol of both arms.
+    factors
+        By which the torque on each sample is multiplied, (n,); by default 1.
+
+    Returns
+    -------
+    Correction
+        Where sweeps did not converge, it says so.
+    """
     arms = [gripper.left] if gripper.left == gripper.right else [gripper.left, gripper.right]
     response = step_response(gripper, network, inertia=False)
     edges = _mesh(torque)

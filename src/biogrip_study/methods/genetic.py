@@ -76,7 +76,22 @@ def identify_many(
     rngs: Sequence[np.random.Generator],
     progress: ReportProgress = silent,
 ) -> list[Fit]:
-    """Identify samples of one model by the paper's genetic algorithm, all at once."""
+    """Identify samples of one model by the paper's genetic algorithm, all at once.
+
+    Parameters
+    ----------
+    problems, rngs
+        Problem of each trace, and the random numbers of its population.
+    settings
+        Config block of the algorithm.
+    progress
+        Told of the number of responses and the lowest misfit after each generation.
+
+    Returns
+    -------
+    list of Fit
+        That of each trace.
+    """
     misfits = make_misfits([problem.residuals for problem in problems])
     genome = Genome(problems[0].ranges)
 
@@ -136,8 +151,17 @@ def identify_many(
 def select(chromosomes: Chromosomes, ranking: Ranking, count: int) -> tuple[Chromosomes, Ranking]:
     """Select the best individuals of each population by their misfits, best first.
 
-    Chromosomes are (n_populations, n, n_genes), misfits (n_populations, n). NaN is ranked last. Of
-    equals the one with the lowest genes is first.
+    Parameters
+    ----------
+    chromosomes, ranking
+        Individuals, (n_populations, n, n_genes), and their misfits, (n_populations, n).
+    count
+        Number of survivors.
+
+    Returns
+    -------
+    tuple
+        Both of the survivors. NaN is ranked last; of equals the one with the lowest genes is first.
     """
     keys: list[NDArray[Any]] = [*np.moveaxis(chromosomes, -1, 0)[::-1], ranking]
     order = np.lexsort(keys)[:, :count]

@@ -97,11 +97,25 @@ _CHANGED_AT_ONCE = 3
 def lowest_encodable(
     misfit: Callable[[Array], Array], ranges: Sequence[GeneRange], starts: Array
 ) -> float:
-    """Return the lowest misfit of all encodable points around some starts, (n, n_parameters).
+    """Return the lowest misfit of all encodable points around some starts.
 
     Around each start's nearest encodable point all neighbours are computed, the last digit or the
     one before it up or down by one in up to three parameters, and then around the best of them,
     until none is better. A lower point elsewhere is not excluded.
+
+    Parameters
+    ----------
+    misfit
+        Function from parameters in SI units, (n, n_parameters), to misfits, (n,).
+    ranges
+        Gene range of each parameter.
+    starts
+        Parameters near which it is looked for, (n_starts, n_parameters).
+
+    Returns
+    -------
+    float
+        In the unit of the misfit.
     """
     values = [encodable_values(genes) for genes in ranges]
     tens = [genes.most[-1] - genes.least[-1] + 1 for genes in ranges]

@@ -16,7 +16,7 @@ from functools import cached_property
 
 import numpy as np
 
-from biogrip.arrays import Array, IntArray, parts
+from biogrip.arrays import Array, IntArray
 from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.protocol import Course
 from biogrip.physics.rate_tables import DecayTable
@@ -24,19 +24,9 @@ from biogrip.physics.residuals import Residuals
 from biogrip.physics.roots import zeros_of_one_branch
 from biogrip.physics.sample_model import Network, SampleModel
 
-# Individuals computed together: many enough for few calls, few enough for the cache.
-_INDIVIDUALS_AT_ONCE = 7000
-
-Misfit = Callable[[Array], Array]
-"""Function from parameters, (n, n_parameters), to RMS misfits in the unit of the readings, (n,)."""
-
 Misfits = Callable[[Array, IntArray], Array]
-"""The same from (n_populations, n, n_parameters) and trace indices to (n_populations, n)."""
-
-
-def make_misfit(residuals: Residuals) -> Misfit:
-    """Return the RMS misfit to the trace of residuals."""
-    return _series_of([residuals]) or residuals.misfit
+"""Function from parameters of populations, (n_populations, n, n_parameters), and the index of the
+trace of each, (n_populations,), to RMS misfits in the unit of the readings, (n_populations, n)."""
 
 
 def make_misfits(residuals: Sequence[Residuals]) -> Misfits:
@@ -47,18 +37,17 @@ def make_misfits(residuals: Sequence[Residuals]) -> Misfits:
     sampled uniformly from the start on, with a reading at each step, in white noise alone.
     """
     alike = len({of_trace.of_responses for of_trace in residuals}) == 1
-    if alike and (series := _series_of(residuals)):
+    if alike and (series := series_of(residuals)):
         return series.of_each
-    misfits = [make_misfit(of_trace) for of_trace in residuals]
 
     def one_by_one(parameters: Array, traces: IntArray) -> Array:
         pairs = zip(parameters, traces, strict=True)
-        return np.stack([misfits[trace](population) for population, trace in pairs])
+        return np.stack([residuals[trace].misfit(population) for population, trace in pairs])
 
     return one_by_one
 
 
-def _series_of(every: Sequence[Residuals]) -> "SeriesMisfit | None":
+def series_of(every: Sequence[Residuals]) -> "SeriesMisfit | None":
     """Return the misfit to traces of residuals that share responses, if these are series."""
     residuals = every[0]
     course, trace = residuals.course, residuals.trace
@@ -120,14 +109,6 @@ class SeriesMisfit:
         Populations are (n_populations, n, n_parameters), in the model's order and SI units; traces
         are given by their indices, (n_populations,).
         """
-        populations, size = parameters.shape[:2]
-        some = max(1, _INDIVIDUALS_AT_ONCE // size)
-        misfit = np.empty((populations, size))
-        for these in parts(populations, some):
-            misfit[these] = self._of_some(parameters[these], traces[these])
-        return misfit
-
-    def _of_some(self, parameters: Array, traces: IntArray) -> Array:
         gripper, model, interval_s = self._simulated
         network = model.network(parameters.reshape(-1, parameters.shape[2]))
         static, rates, weights = two_modes(gripper.left, gripper.lever_m, network)
@@ -181,8 +162,20 @@ def two_modes(arm: Arm, lever_m: float, network: Network) -> tuple[Array, Array,
 
     A sample with one Maxwell branch has two modes without inertia. This special case of
     `biogrip.physics.response` is written out for speed: populations are small, and most time goes
-    into calls. Returns the final rotation in rad per N m, (n,), the exponents in 1/s and their
-    weights in rad per N m, (2, n).
+    into calls.
+
+    Parameters
+    ----------
+    arm, lever_m
+        Either arm, and its lever on the sample.
+    network
+        Of n samples.
+
+    Returns
+    -------
+    tuple of Array
+        Final rotation in rad per N m, (n,); exponents in 1/s and their weights in rad per N m,
+        (2, n).
     """
     squared_lever = lever_m**2
     rate = network.k[:, 0] / network.c[:, 0]

@@ -202,11 +202,24 @@ def basins(identified: "pd.DataFrame", study: Study) -> "dict[str, pd.DataFrame]
 
 
 def chi_square_increase(identified: "pd.DataFrame", case: Case, of: str = "misfit") -> Array:
-    """Return the increase of each identification's chi^2 over the lowest of its trace, (n,).
+    """Return the increase of each identification's chi^2 over the lowest of its trace.
 
-    Identifications by all methods are given, and the column of misfits. The lowest is that of any
-    method, or that of the true parameters where these are known; the best fit of a few parameters
-    lies below the latter.
+    The lowest is that of any method, or that of the true parameters where these are known; the best
+    fit of a few parameters lies below the latter.
+
+    Parameters
+    ----------
+    identified
+        Identifications by all methods, a row each.
+    case
+        Whose readings are counted.
+    of
+        Column of misfits.
+
+    Returns
+    -------
+    Array
+        (n,)
     """
     misfit = identified["misfit"]
     lowest = misfit.groupby(identified["seed"]).transform("min")

@@ -47,18 +47,15 @@ class RowFile:
         text, words = whole(path, self.what), self.words
         try:
             frame = pd.read_csv(StringIO(text, newline=""), dtype=dict.fromkeys(words or (), str))
+            for name, cells in frame.items():
+                is_text = words is None or name in words
+                frame[name] = cells.map(as_it_was) if is_text else pd.to_numeric(cells)
         except ValueError as error:
             raise BiogripError(
                 f"{path}: cannot be read as {self.what}: {error}. {AGAIN}"
             ) from error
         if not {*self.columns} <= {*frame.columns}:
             raise BiogripError(f"{path}, line 1: wanted the columns {', '.join(self.columns)}.")
-        for column in frame.columns:
-            if frame.empty or pd.api.types.is_numeric_dtype(frame[column]):
-                continue
-            if words is not None and column not in words:
-                raise BiogripError(f"{path}: {column}: not all are numbers. {AGAIN}")
-            frame[column] = frame[column].map(as_it_was)
         if known:
             require_rows(path, frame, [*known], product(*known.values()))
         return frame

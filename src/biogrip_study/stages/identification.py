@@ -43,7 +43,17 @@ def identify_seeds(
     parameters: Path,
     history: Path,
 ) -> None:
-    """Identify a batch of seeds with one method."""
+    """Identify a batch of seeds with one method.
+
+    Parameters
+    ----------
+    case, method, seeds
+        The case, the name of the method, and the seeds of the batch.
+    measurements
+        Their traces, npz.
+    parameters, history
+        Written: a row a seed, CSV, and one a generation, npz.
+    """
     identified = partial(identify_by, method, case.block.method(method))
     recorded = read_measurements(measurements, list(seeds))
     experiment = experiment_for(case.experiment, recorded).to_identify()
@@ -100,7 +110,17 @@ def join(
 
 
 def fit(case: Case, seeds: Sequence[int], measurements: Path, fits: Path) -> None:
-    """Fit a batch of seeds by least squares with each model."""
+    """Fit a batch of seeds by least squares with each model.
+
+    Parameters
+    ----------
+    case, seeds
+        The case, and the seeds of the batch.
+    measurements
+        Their traces, npz.
+    fits
+        Written: a row per model and seed, CSV, see `MODEL_FITS`.
+    """
     models = {name: sample.model for name, sample in case.models.items()}
     recorded = read_measurements(measurements, list(seeds))
     experiment = experiment_for(case.experiment, recorded).to_identify(*models.values())

@@ -44,7 +44,15 @@ JUDGED_SEED = 0
 
 
 def judge(case: Case, measurements: Path, verdicts: Path) -> None:
-    """Identify the trace of seed 0, and write verdicts and profiles."""
+    """Identify the trace of seed 0, and write verdicts and profiles.
+
+    Parameters
+    ----------
+    case, measurements
+        The case, and its traces, npz.
+    verdicts
+        Written, JSON.
+    """
     recorded = read_measurements(measurements, [JUDGED_SEED])
     experiment = experiment_for(case.judged_experiment, recorded)
     (diagnosis,) = identify_alike([(recorded.recording, experiment)])
@@ -97,6 +105,15 @@ def estimate_intervals(
     """Fit a batch of seeds, and compute intervals of what `expected` verdicts call determined.
 
     The noise of a seed is that of its measurement.
+
+    Parameters
+    ----------
+    case, seeds
+        The case, and the seeds of the batch.
+    target, expected
+        Its trace without noise, CSV, and the verdicts to expect, JSON.
+    intervals
+        Written: a row per quantity and seed, CSV, see `INTERVALS`.
     """
     experiment = case.judged_experiment
     time_s, _, rotation = read_target(target, case.times_s)
@@ -153,7 +170,22 @@ def _rest_known(
 def judge_quantities(
     fits: Sequence[TraceFit], quantities: Sequence[Quantity], confidence: float
 ) -> list[Diagnosis]:
-    """Judge quantities of traces as users are shown them, but for notes and combinations."""
+    """Judge quantities of traces as users are shown them, but for notes and combinations.
+
+    Parameters
+    ----------
+    fits
+        Best fit of each trace.
+    quantities
+        Those of one model.
+    confidence
+        Of the limits, between 0 and 1.
+
+    Returns
+    -------
+    list of Diagnosis
+        That of each trace.
+    """
 
     def profile(likelihoods: Sequence[Likelihood]) -> list[Diagnosis]:
         every = compute_findings(likelihoods, quantities, smooth=False)

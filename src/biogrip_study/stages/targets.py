@@ -21,10 +21,8 @@ from biogrip.terminal import warn
 from biogrip.traces.columns import place
 from biogrip_study.config.study import Case
 from biogrip_study.gripper.calibration import calibrate, calibration_yaml, free_motion
-from biogrip_study.gripper.nonlinear import nonlinear_rotation
-from biogrip_study.gripper.simulation import jaw_force, target_grip
+from biogrip_study.gripper.nonlinear import jaw_force, nonlinear_rotation, target_grip
 from biogrip_study.gripper.unilateral import unilateral_response
-from biogrip_study.records.rows import write_arrays
 from biogrip_study.records.traces import (
     Measurements,
     measurements_of,
@@ -86,20 +84,26 @@ def measure(case: Case, seeds: Iterable[int], target: Path, measurements: Path) 
     write_measurements(measurements, Measurements(time_s, rotation, traces))
 
 
-def calibrate_gripper(case: Case, gripper: Path, records: Path) -> None:
-    """Simulate both arms' free motion with noise, and identify their properties."""
+def calibrate_gripper(case: Case, gripper: Path) -> None:
+    """Simulate both arms' free motion with noise, and identify their properties.
+
+    Parameters
+    ----------
+    case
+        Whose true gripper is tested as its block `calibration` says.
+    gripper
+        Written: the calibrated gripper, YAML.
+    """
     test = case.block.calibration
     time_s = sample_times(test.duration_s, test.rate_Hz)
     noise = Noise("gaussian", test.noise_level, "peak")
     causes = test.step_torque_Nm, test.impulse_Nms
-    columns, arms, uncertainty = {"time_s": time_s}, {}, {}
+    arms, uncertainty = {}, {}
     for name in ("left", "right"):
         rng = stream(case.study.config.study_seed, case.name, 0, f"calibration {name}")
         motion = free_motion(getattr(case.gripper, name), time_s, *causes)
         measured = np.stack([add_noise(clean, noise, rng) for clean in motion])
-        columns |= zip((f"{name}_step_rad", f"{name}_impulse_rad"), measured, strict=True)
         arms[name], uncertainty[name] = calibrate(time_s, measured, *causes)
-    write_arrays(records, columns)
     write_text(gripper, calibration_yaml(arms, uncertainty))
 
 

@@ -57,7 +57,15 @@ class ShownTable:
 
 
 def write(table: ShownTable, output: Path) -> None:
-    """Write a table as CSV, and without empty columns as HTML beside it."""
+    """Write a table as CSV, and without empty columns as HTML beside it.
+
+    Parameters
+    ----------
+    table
+        Caption, columns and rows.
+    output
+        The CSV; the HTML has the same name.
+    """
     columns = table.columns
     shown = pd.DataFrame(
         [[_cell_text(row.get(c.name), c.digits) for c in columns] for row in table.rows],

@@ -180,9 +180,17 @@ def _by_quantity(
 
 
 def bounds_at_truth(case: Case, target: Path) -> dict[str, float]:
-    """Return the Cramér-Rao bound of what is searched of a case, at the true parameters, by label.
+    """Return the Cramér-Rao bound of what is searched of a case, at the true parameters.
 
-    That is the standard deviation of the quantity's logarithm.
+    Parameters
+    ----------
+    case, target
+        The case, and its trace without noise, CSV.
+
+    Returns
+    -------
+    dict
+        Standard deviation of the logarithm of each of `parameters_and_sum`, by label.
     """
     experiment = case.experiment
     time_s, _, rotation = read_target(target, case.times_s)
