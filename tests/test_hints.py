@@ -236,7 +236,8 @@ KINDS = {
             "--unit: found",
             ": goes with --hold",
         ),
-        *("takes the shape of a tip", "'; allowed is a table that `biogrip identify --csv` wrote"),
+        *(": goes with --hold", "takes the shape of a tip"),
+        *("'; allowed is a table that `biogrip identify --csv` wrote"),
         *("with __use_yte__", "snakemake -j2 --configfile ", "--hold", "--ramp"),
     ),
 }
