@@ -18,7 +18,14 @@ from flask.testing import FlaskClient
 from playwright.sync_api import Page, expect
 
 import biogrip.app.window as window_of
-from biogrip.app.choices import CHOICES, KNOWN, likely_choices, options_typed, remedies_in
+from biogrip.app.choices import (
+    CHOICES,
+    KNOWN,
+    likely_choices,
+    options_typed,
+    remedies_in,
+    with_option,
+)
 from biogrip.app.server import app_of
 from biogrip.app.window import Window
 from biogrip.cli import main
@@ -458,3 +465,54 @@ def test_every_model_is_drawn_with_its_elements() -> None:
         dampers = sum(own.startswith("c") for own in names)
         counts = text.count("/\\/\\"), text.count("[==]"), text.count("<>")
         assert counts == (len(names) - dampers - 2 * springpots, dampers, springpots)
+
+
+def window_of_columns(folder: Path, header: str, **chosen: str) -> Window:
+    """A window with a file of these columns, of which some things are chosen."""
+    time_s = np.arange(0, 30, 0.5)
+    write_trace(folder / "a.csv", *[1 + time_s] * len(header.split(",")), header=header)
+    window = Window(folder, names=["a.csv"])
+    window.look()
+    window.chosen |= chosen
+    window.check()
+    return window
+
+
+@pytest.mark.parametrize(
+    ("header", "chosen", "typed"),
+    [
+        (
+            "time_s,length_um",
+            {"hold": "300 Pa"},
+            [{"shape": "pipette 2.5 um"}],
+        ),
+        (
+            "time_s,length_um,pressure_Pa",
+            {"reading": "displacement", "column": "length_um", "load": "pressure_Pa"},
+            [{"shape": "pipette 2.5 um"}],
+        ),
+        (
+            "time_s,length_um",
+            {"reading": "strain", "hold": "300 Pa"},
+            [
+                {"shape": "cylinder 8 mm x 4 mm"},
+                {"reading": "displacement", "column": "length_um"},
+                {"shape": "pipette 2.5 um"},
+            ],
+        ),
+    ],
+)
+def test_what_has_a_unit_of_another_kind_needs_a_shape(
+    tmp_path: Path, header: str, chosen: dict[str, str], typed: list[dict[str, str]]
+) -> None:
+    """No button calls a length a pure number; by the buttons one after the other it can run."""
+    for expected in typed:
+        window = window_of_columns(tmp_path, header, **chosen)
+        (remedy,) = remedies_in(window.problem)
+        assert with_option(*remedy, "") == expected
+        chosen |= expected
+    assert window_of_columns(tmp_path, header, **chosen).problem == ""
+    forced = {"shape": "", "reading": "strain", "load": "", "hold": "300 Pa"}
+    forced |= {"more": "--set measurement.reading_unit=1"}
+    window = window_of_columns(tmp_path, header, **{**chosen, **forced})
+    assert "found the unit '1' where the name says 'um'" in window.problem

@@ -11,6 +11,7 @@ modulus is read, a hold of 1 needs no option.
 
 import os
 import re
+import shlex
 import sys
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
@@ -135,10 +136,10 @@ class Asked:
             blocks = _laid_over(blocks, setting)
         counts_as = _by_shape(measured := measured_keys(blocks))
         for name in {*measured} & ({*counts_as.values()} - {*counts_as}):
+            read = f"{[*counts_as][name == STRAIN.name]}={measured[name]}"
             raise BiogripError(
                 f"{self.place}: found a shape and a reading of {name}; allowed are "
-                f"{' and '.join(counts_as)}, as by --reading {[*counts_as][name == STRAIN.name]}="
-                "COLUMN."
+                f"{' and '.join(counts_as)}, as by --reading {shlex.quote(read)}."
             )
         renamed = {counts_as.get(key, key): value for key, value in measured.items()}
         return {**blocks, "measurement": renamed} if counts_as else blocks
