@@ -23,6 +23,7 @@ from biogrip.app.choices import (
     KNOWN,
     likely_choices,
     options_typed,
+    remedies_by_column,
     remedies_in,
     with_option,
 )
@@ -516,3 +517,20 @@ def test_what_has_a_unit_of_another_kind_needs_a_shape(
     forced |= {"more": "--set measurement.reading_unit=1"}
     window = window_of_columns(tmp_path, header, **{**chosen, **forced})
     assert "found the unit '1' where the name says 'um'" in window.problem
+
+
+def test_each_column_without_a_unit_has_its_own(
+    client: FlaskClient, windows: dict[str, Window]
+) -> None:
+    rows = b"time,stress\n1,2\n2,3\n3,4\n"
+    post(client, "files", files=(BytesIO(rows), "a.csv"))
+    page = post(client, "choose", hold="2 %")
+    found = remedies_by_column(windows["one"].problem)
+    assert [*found] == ["time", "stress"]
+    assert [*found["time"].values()] == ["s", "ms", "us", "min", "h", "d"]
+    assert [*found["stress"].values()][:3] == ["Pa", "kPa", "MPa"]
+    rows_shown = re.findall(r'<p class="buttons">(\w+): .*?value="--set ([\w.]+)=', page)
+    assert rows_shown == [
+        ("time", "measurement.time_unit"),
+        ("stress", "measurement.reading_unit"),
+    ]

@@ -89,8 +89,17 @@ def with_option(option: str, value: str, more: str) -> dict[str, str]:
     return {"more": f"{more} {shlex.join(filter(None, (option, value)))}".strip()}
 
 
+def remedies_by_column(message: str) -> dict[str, dict[tuple[str, str], str]]:
+    """Return remedies of a message's lines by the column that they are about, or by nothing."""
+    remedies: dict[str, dict[tuple[str, str], str]] = {}
+    for line in message.split("\n"):
+        column = line.partition(", column '")[2].partition("': ")[0]
+        remedies[column] = remedies.get(column, {}) | remedies_in(line)
+    return remedies
+
+
 def remedies_in(message: str) -> dict[tuple[str, str], str]:
-    """Return options and values that a message names, with what their buttons say.
+    """Return options and values that a line names, with what their buttons say.
 
     Where it asks for a unit, there is one for each that is allowed.
     """

@@ -13,7 +13,7 @@ from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory, mkdtemp
 
-from biogrip.app.choices import CHOICES, KNOWN, TICKED, remedies_in, with_option
+from biogrip.app.choices import CHOICES, KNOWN, TICKED, remedies_by_column, with_option
 from biogrip.app.window import LARGEST_MB, LONGEST_S, Window
 from biogrip.errors import BiogripError
 from biogrip.page.templates import environment
@@ -37,7 +37,7 @@ _HEADERS = {"Content-Security-Policy": _POLICY, "X-Content-Type-Options": "nosni
 _SHOWN = {
     **{"known": KNOWN, "instruments": INSTRUMENTS, "limits": (LARGEST_MB, LONGEST_S // 60)},
     **{"candidates": CANDIDATES, "shapes": KNOWN_SHAPES, "units": TIME_UNITS, "outputs": _OUTPUTS},
-    **{"remedies_in": remedies_in, "form_in_words": form_in_words},
+    **{"remedies_by_column": remedies_by_column, "form_in_words": form_in_words},
 }
 
 

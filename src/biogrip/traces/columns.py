@@ -116,7 +116,9 @@ def unit_of(
     if given is not None and unit is None:
         raise BiogripError(f"{where}: found the unit '{given}', allowed are {choices}.")
     end = _said_at_end(column) or ""
-    kind = known_unit(end or _bare(below), _READING_UNITS - {"1"})
+    # That of an axis may be shortened, as time_m.
+    known = _READING_UNITS - {"1"} if allowed not in AXES.values() else ()
+    kind = known_unit(end or _bare(below), known)
     if given and not scaled:
         in_row = in_row or known_unit(_bare(below), _READING_UNITS)
         at_end = at_end or (kind if end else None)
