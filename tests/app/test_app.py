@@ -100,7 +100,7 @@ def choose(page: Page, chosen: Mapping[str, str]) -> None:
 
 def identified(page: Page, folder: Path) -> list[dict[str, str]]:
     """The table that is downloaded, after it is compared with what the shown command writes."""
-    page.click("text=Identify >> nth=-1")
+    page.click("button.main")
     link = page.locator("a.button", has_text="table.csv")
     link.wait_for(timeout=120_000)
     with page.expect_download() as download:
@@ -225,7 +225,7 @@ def test_what_is_missing_or_stopped_is_told_and_mended_in_place(
     expect(window.locator("#typed")).to_contain_text("--set measurement.time_unit=ms")
     expect(window.locator("#files")).to_contain_text("clock, in ms")
     choose(window, {"model": "generalized_maxwell_2"})
-    window.click("text=Identify >> nth=-1")
+    window.click("button.main")
     expect(window.locator("#result [role=status]")).to_contain_text(re.compile("for [2-9] s"))
     window.click("text=Stop >> nth=-1")
     expect(window.locator("#result [role=alert]")).to_contain_text("no file was left half-written")
@@ -534,3 +534,30 @@ def test_each_column_without_a_unit_has_its_own(
         ("time", "measurement.time_unit"),
         ("stress", "measurement.reading_unit"),
     ]
+
+
+def test_it_asks_for_columns_first(client: FlaskClient, windows: dict[str, Window]) -> None:
+    rows = b"clock,y\ns,um\n1,2\n2,3\n3,4\n4,4\n5,5\n6,5\n"
+    asked = 'class="problem">Which column is the {}?'
+    assert asked.format("reading") in post(client, "files", files=(BytesIO(rows), "a.csv"))
+    chosen = {"reading": "displacement", "column": "y", "hold": "20 pN"}
+    assert asked.format("time") in post(client, "choose", **chosen)
+    post(client, "choose", time="clock")
+    assert windows["one"].problem == ""
+
+
+def test_a_result_of_other_choices_is_told(client: FlaskClient, windows: dict[str, Window]) -> None:
+    post(client, "example", do="a pipette")
+    assert ">Working on it …</span>" in post(client, "start")
+    changed = post(client, "choose", hold="300 Pa")
+    assert ">Settings changed: identify again.</span>" in changed
+    assert "--hold &#39;400 Pa&#39;" in changed.partition("This is the result of: ")[2][:200]
+    assert ' class="stale"' in changed
+    assert ' class="stale"' not in post(client, "choose", hold="400 Pa")
+    work = windows["one"].work
+    assert work
+    post(client, "stop")
+    assert ">Ended early: see the result.</span>" in post(client, "show")
+    window = windows["one"]
+    post(client, "files", files=(BytesIO((DATA / "pipette.csv").read_bytes()), "pipette.csv"))
+    assert window.stale

@@ -21,6 +21,8 @@ async function answered(action, more) {
   if (!answer.ok) return fail(`${page.title}: ${page.querySelector("p")?.textContent}`);
   fail("");
   show(page, new Map(new FormData(form)), sent);
+  const next = document.querySelector("#command .problem") ? "command" : "result";
+  if (action === "start") document.getElementById(next).scrollIntoView();
 }
 
 function fail(text) {
@@ -43,6 +45,8 @@ function show(page, typed, sent) {
       else input.value = value;
     }
   }
+  const [state, now] = [document, page].map((any) => any.getElementById("state"));
+  if (state.textContent !== now.textContent) state.textContent = now.textContent;
   if (focused && document.activeElement.id !== focused) document.getElementById(focused)?.focus();
   draw();
   wait();
@@ -62,6 +66,8 @@ form.addEventListener("change", ({ target }) => {
 form.addEventListener("click", ({ target }) => {
   if (target.id === "copy") navigator.clipboard.writeText(document.getElementById("typed").textContent);
   else if (target.dataset.do) send(target.dataset.do, { do: target.value });
+  // Its sizes are an example.
+  if (target.value?.startsWith("--shape")) document.getElementById("shape")?.focus();
 });
 const upload = (files) => send("files", { files: [...files] });
 document.addEventListener("dragover", (event) => {

@@ -21,6 +21,7 @@ from biogrip.command.settings import Asked, check_settings, read_trace
 from biogrip.command.sheet import is_table
 from biogrip.command.words import limits_in_short
 from biogrip.errors import BiogripError
+from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.traces.reader import Recording
 from biogrip.traces.tables import Sheet, Table, numbers_in, overview
 
@@ -64,6 +65,8 @@ class Window:
     """The command, while it runs and when it has ended."""
     out: Path = Path()
     started: float = 0.0
+    ran: str = ""
+    """What had been typed for it; nothing if a file has come since."""
     compared: str = ""
     """What the comparison of groups says."""
 
@@ -75,6 +78,7 @@ class Window:
         else:
             self.names = [*dict.fromkeys([*self.names, plain])]
         (self.folder / plain).write_bytes(content.read())
+        self.ran = ""
 
     @property
     def inputs(self) -> list[str]:
@@ -113,7 +117,16 @@ class Window:
             check_settings(there[:_CHECKED])
             self.recording = read_trace(there[0])[0] if there else None
         except BiogripError as error:
-            self.problem = self.shown(error)
+            self.problem = self._missing() or self.shown(error)
+
+    def _missing(self) -> str:
+        """Ask for the column of readings, or of what they follow, before anything else."""
+        axis = "frequency" if INSTRUMENTS[self.chosen["reading"] or "rotation"].sweeps else "time"
+        asked = {"column": "reading", axis: axis}
+        missing = (what for name, what in asked.items() if not self.chosen[name])
+        if self.config or not self.table or self.names != self.inputs:
+            return ""
+        return next((f"Which column is the {what}? Choose it under 2." for what in missing), "")
 
     def _traces(self) -> list[Asked]:
         """Return what is asked; a `BiogripError` says what the window does not do."""
@@ -139,6 +152,20 @@ class Window:
         return int(time.time() - self.started) + 1 if self.work and self.work.poll() is None else 0
 
     @property
+    def stale(self) -> bool:
+        """True of a result of other choices or files than those that are shown."""
+        return self.work is not None and self.command != self.ran
+
+    @property
+    def state(self) -> str:
+        """How far the command is, in a sentence."""
+        if self.work is None or self.stale:
+            return "Settings changed: identify again." * self.stale
+        if self.running_s:
+            return "Working on it …"
+        return "Ended early: see the result." if self.work.returncode else "Done: see the result."
+
+    @property
     def of_table(self) -> bool:
         """True of several traces, or of a table of them."""
         return len(self.traces) > 1 or any(own.place != Asked.place for own in self.traces)
@@ -146,7 +173,7 @@ class Window:
     def start(self) -> None:
         """Start the command in a process of its own, in place of what ran before."""
         self.stop()
-        self.started, self.compared = time.time(), ""
+        self.started, self.compared, self.ran = time.time(), "", self.command
         self.out = self.folder.with_name(f"{self.folder.name} {time.monotonic_ns()}")
         self.out.mkdir()
         names = {"--report": "page.html", "--csv": "table.csv", "--output": "result.json"}
