@@ -561,3 +561,21 @@ def test_a_result_of_other_choices_is_told(client: FlaskClient, windows: dict[st
     window = windows["one"]
     post(client, "files", files=(BytesIO((DATA / "pipette.csv").read_bytes()), "pipette.csv"))
     assert window.stale
+
+
+def test_the_picture_follows_the_reading_and_says_units(
+    client: FlaskClient, windows: dict[str, Window]
+) -> None:
+    rows = "time;length;force\nmin;um;nN\n" + "".join(f"{n};{n + 1};{2 * n}\n" for n in range(9))
+    page = post(client, "files", files=(BytesIO(rows.encode()), "a.csv"))
+    chosen = windows["one"].chosen
+    assert (chosen["across"], chosen["upward"]) == ("time", "length")
+    assert windows["one"].units == {"time": "min", "length": "um", "force": "nN"}
+    assert "Use nothing after (s)" in page
+    assert "range of times, in s; the picture is in min." in page
+    post(client, "choose", across="length")
+    assert (chosen["across"], chosen["upward"]) == ("length", "length")
+    post(client, "choose", reading="force", column="force", load="length")
+    chosen = windows["one"].chosen
+    assert (chosen["across"], chosen["upward"]) == ("time", "force")
+    assert "Use nothing below (Hz)" in post(client, "example", do="a frequency sweep")

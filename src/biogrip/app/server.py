@@ -114,6 +114,7 @@ def app_of(windows: dict[str, Window], token: str) -> Flask:
 def _do(action: str, window: Window) -> None:
     """Take what is chosen, and do one thing more."""
     given, do = request.form, request.form.get("do", "")
+    drawn = [window.chosen[name] for name in (window.axis, "column")]
     window.chosen |= {key: given.get(key, "") for key in CHOICES if key in (*given, *TICKED)}
     if action == "files":
         for file in request.files.getlist("files"):
@@ -128,5 +129,9 @@ def _do(action: str, window: Window) -> None:
         window.chosen |= with_option(option, value, window.chosen["more"])
     if action != "show" and window.names:
         window.check()
+    # The picture follows what is read.
+    if (now := [window.chosen[name] for name in (window.axis, "column")]) != drawn:
+        shown = zip(("across", "upward"), now, strict=True)
+        window.chosen |= {name: column for name, column in shown if column}
     if action in ("stop", "compare") or (action == "start" and window.traces):
         getattr(window, action)()

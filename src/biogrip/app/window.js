@@ -82,7 +82,7 @@ document.addEventListener("drop", (event) => {
 });
 
 // The picture: points of a column over another, and the range that is used.
-const [left, right, top_, bottom] = [90, 650, 10, 300];
+const [left, right, top_, bottom] = [150, 650, 10, 300];
 
 function draw() {
   const svg = document.querySelector("#picture svg");
@@ -113,10 +113,13 @@ function draw() {
   const x = scale(pairs.map((pair) => pair[0]), left, right);
   const y = scale(pairs.map((pair) => pair[1]), bottom, top_);
   add("path", { d: pairs.map(([a, b]) => `M${x.at(a).toFixed(1)},${y.at(b).toFixed(1)}h0`).join("") });
-  const short = (value) => +value.toPrecision(4);
+  const short = (value) => +value.toPrecision(3);
+  const units = JSON.parse(svg.dataset.units);
+  const named = (name) => units[name] && !name.includes(units[name]) ? `${name}, in ${units[name]}` : name;
+  add("text", { transform: `translate(24 ${(top_ + bottom) / 2}) rotate(-90)`, "text-anchor": "middle" }, named(upward));
   add("text", { x: left, y: bottom + 20 }, short(x.low));
   add("text", { x: right, y: bottom + 20, "text-anchor": "end" }, short(x.high));
-  add("text", { x: (left + right) / 2, y: bottom + 36, "text-anchor": "middle" }, across);
+  add("text", { x: (left + right) / 2, y: bottom + 36, "text-anchor": "middle" }, named(across));
   add("text", { x: left - 6, y: bottom, "text-anchor": "end" }, short(y.low));
   add("text", { x: left - 6, y: top_ + 10, "text-anchor": "end" }, short(y.high));
   if (across !== svg.dataset.axis) return;

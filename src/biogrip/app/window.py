@@ -90,6 +90,20 @@ class Window:
         """The command as it is typed, but for what it writes."""
         return ["identify", *self.inputs, *options_typed(self.chosen), *self.config]
 
+    @property
+    def axis(self) -> str:
+        """What readings follow: time or frequency."""
+        return "frequency" if INSTRUMENTS[self.chosen["reading"] or "rotation"].sweeps else "time"
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Units of columns that have one, as they are read or stand below the names."""
+        below = zip(self.table.names, self.table.units or (), strict=False) if self.table else ()
+        units = {name: unit.strip("[]() ") for name, unit in below}
+        read = self.recording.form["columns"].values() if self.recording else ()
+        units |= {it["column"]: it["unit"] for it in read}
+        return {name: unit for name, unit in units.items() if unit not in ("", "1", "-")}
+
     def look(self) -> None:
         """Read the first trace; if it has not what is chosen, choose what names of columns tell."""
         first = next((name for name in self.names if name not in self.inputs), self.names[0])
@@ -121,8 +135,7 @@ class Window:
 
     def _missing(self) -> str:
         """Ask for the column of readings, or of what they follow, before anything else."""
-        axis = "frequency" if INSTRUMENTS[self.chosen["reading"] or "rotation"].sweeps else "time"
-        asked = {"column": "reading", axis: axis}
+        asked = {"column": "reading", self.axis: self.axis}
         missing = (what for name, what in asked.items() if not self.chosen[name])
         if self.config or not self.table or self.names != self.inputs:
             return ""
