@@ -579,3 +579,16 @@ def test_the_picture_follows_the_reading_and_says_units(
     chosen = windows["one"].chosen
     assert (chosen["across"], chosen["upward"]) == ("time", "force")
     assert "Use nothing below (Hz)" in post(client, "example", do="a frequency sweep")
+
+
+def test_what_was_held_has_its_name_and_example(client: FlaskClient) -> None:
+    page = post(client, "example", do="a pipette")
+    assert "What was held (pressure), with its unit" in page
+    assert 'placeholder="300 Pa"' in page
+    assert "What was held (force), with its unit" in post(client, "choose", shape="")
+    page = post(client, "choose", reading="stress", hold="2")
+    assert "What was held (strain), with its unit" in page
+    assert 'placeholder="2 %"' in page
+    assert "A strain of 2 is 200 %." in page
+    for hold in ("2 %", "0.02"):
+        assert "A strain of" not in post(client, "choose", hold=hold)
