@@ -592,3 +592,31 @@ def test_what_was_held_has_its_name_and_example(client: FlaskClient) -> None:
     assert "A strain of 2 is 200 %." in page
     for hold in ("2 %", "0.02"):
         assert "A strain of" not in post(client, "choose", hold=hold)
+
+
+def test_a_phone_shows_numbers_whole_what_is_copied_and_the_result(
+    visit: Callable[..., Opened], address: str, tmp_path: Path
+) -> None:
+    page = visit(address, viewport=PHONE, permissions=["clipboard-write", "clipboard-read"]).page
+    time_s = np.arange(0.5, 30, 0.5)
+    strain = -1.2345e-7 * (1 - 0.5 * np.exp(-time_s / 5))
+    write_trace(tmp_path / "a.csv", time_s, strain, header="time_s,strain")
+    page.set_input_files("#upload", tmp_path / "a.csv")
+    page.fill("#hold", "300 Pa")
+    page.press("#hold", "Tab")
+    expect(page.locator("#typed")).to_contain_text("300 Pa")
+    inside = "all => all.map(text => text.getBBox().x)"
+    numbers = page.locator("#picture text", has_text="e-")
+    expect(numbers).to_have_count(2)
+    # The name of the axis stands left of them, within 40 of 660.
+    assert min(numbers.evaluate_all(inside)) > 30
+    page.click("#copy")
+    expect(page.locator("#copied")).to_have_text("Copied.")
+    assert page.evaluate("navigator.clipboard.readText()") == page.inner_text("#typed")
+    page.click("button.main")
+    expect(page.locator("#state")).to_have_text(re.compile("Working|Done"))
+    expect(page.locator("#h-result")).to_be_in_viewport()
+    page.fill("#hold", "200 Pa")
+    page.press("#hold", "Tab")
+    expect(page.locator("#state")).to_have_text("Settings changed: identify again.")
+    expect(page.locator("#result.stale .problem")).to_contain_text("--hold '300 Pa'")

@@ -64,7 +64,9 @@ form.addEventListener("change", ({ target }) => {
   target.value = "";
 });
 form.addEventListener("click", ({ target }) => {
-  if (target.id === "copy") navigator.clipboard.writeText(document.getElementById("typed").textContent);
+  if (target.id === "copy")
+    navigator.clipboard.writeText(document.getElementById("typed").textContent)
+      .then(() => { document.getElementById("copied").textContent = "Copied."; }, (error) => fail(String(error)));
   else if (target.dataset.do) send(target.dataset.do, { do: target.value });
   // Its sizes are an example.
   if (target.value?.startsWith("--shape")) document.getElementById("shape")?.focus();
