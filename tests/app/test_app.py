@@ -489,7 +489,7 @@ def window_of_columns(folder: Path, header: str, **chosen: str) -> Window:
         ),
         (
             "time_s,length_um,pressure_Pa",
-            {"reading": "displacement", "column": "length_um", "load": "pressure_Pa"},
+            {},
             [{"shape": "pipette 2.5 um"}],
         ),
         (

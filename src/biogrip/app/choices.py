@@ -11,7 +11,7 @@ import yaml
 from biogrip.arrays import Array
 from biogrip.command.options import GROUPS
 from biogrip.errors import BiogripError
-from biogrip.physics.instruments import INSTRUMENTS, PARTNERS, ROTATION
+from biogrip.physics.instruments import DISPLACEMENT, INSTRUMENTS, PARTNERS, ROTATION, STRESS
 from biogrip.traces.columns import AXES, plain_name
 
 KNOWN = yaml.safe_load(Path(__file__).with_name("known.yaml").read_text("utf-8"))
@@ -49,6 +49,9 @@ def likely_choices(numbers: Mapping[str, Array]) -> dict[str, str]:
     reading, load = instrument.read.name, instrument.controlled.name * (not instrument.relative)
     if {load, reading} <= {*columns}:
         load, reading = sorted((load, reading), key=lambda name: _steps(numbers[columns[name]]))
+    elif reading == DISPLACEMENT.name and STRESS.name in columns:
+        # A pipette sucks.
+        load = STRESS.name
     partner = next((name for name in PARTNERS if name in columns), "")
     chosen = {"column": reading, "load": load, "partner_column": partner}
     chosen |= {axis: axis for axis in AXES}

@@ -117,7 +117,10 @@ function draw() {
   add("path", { d: pairs.map(([a, b]) => `M${x.at(a).toFixed(1)},${y.at(b).toFixed(1)}h0`).join("") });
   const short = (value) => +value.toPrecision(3);
   const units = JSON.parse(svg.dataset.units);
-  const named = (name) => units[name] && !name.includes(units[name]) ? `${name}, in ${units[name]}` : name;
+  const named = (name) => {
+    const stated = [..."_ ([{/"].some((mark) => name.replace(/[µμ]/g, "u").includes(mark + units[name]));
+    return units[name] && !stated ? `${name}, in ${units[name]}` : name;
+  };
   add("text", { transform: `translate(24 ${(top_ + bottom) / 2}) rotate(-90)`, "text-anchor": "middle" }, named(upward));
   add("text", { x: left, y: bottom + 20 }, short(x.low));
   add("text", { x: right, y: bottom + 20, "text-anchor": "end" }, short(x.high));
