@@ -558,9 +558,8 @@ def test_a_result_of_other_choices_is_told(client: FlaskClient, windows: dict[st
     assert work
     post(client, "stop")
     assert ">Ended early: see the result.</span>" in post(client, "show")
-    window = windows["one"]
-    post(client, "files", files=(BytesIO((DATA / "pipette.csv").read_bytes()), "pipette.csv"))
-    assert window.stale
+    file = BytesIO((DATA / "pipette.csv").read_bytes()), "pipette.csv"
+    assert "the result of: files before these" in post(client, "files", files=file)
 
 
 def test_the_picture_follows_the_reading_and_says_units(

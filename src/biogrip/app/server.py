@@ -131,7 +131,6 @@ def _do(action: str, window: Window) -> None:
         window.check()
     # The picture follows what is read.
     if (now := [window.chosen[name] for name in (window.axis, "column")]) != drawn:
-        shown = zip(("across", "upward"), now, strict=True)
-        window.chosen |= {name: column for name, column in shown if column}
+        window.chosen |= {"across": now[0], "upward": now[1]}
     if action in ("stop", "compare") or (action == "start" and window.traces):
         getattr(window, action)()

@@ -99,10 +99,9 @@ class Window:
     def units(self) -> dict[str, str]:
         """Units of columns that have one, as they are read or stand below the names."""
         below = zip(self.table.names, self.table.units or (), strict=False) if self.table else ()
-        units = {name: unit.strip("[]() ") for name, unit in below}
         read = self.recording.form["columns"].values() if self.recording else ()
-        units |= {it["column"]: it["unit"] for it in read}
-        return {name: unit for name, unit in units.items() if unit not in ("", "1", "-")}
+        units = dict(below) | {it["column"]: it["unit"] for it in read}
+        return {name: unit.strip("[]() ") for name, unit in units.items() if unit not in ("1", "-")}
 
     def look(self) -> None:
         """Read the first trace; if it has not what is chosen, choose what names of columns tell."""
@@ -135,11 +134,10 @@ class Window:
 
     def _missing(self) -> str:
         """Ask for the column of readings, or of what they follow, before anything else."""
-        asked = {"column": "reading", self.axis: self.axis}
-        missing = (what for name, what in asked.items() if not self.chosen[name])
-        if self.config or not self.table or self.names != self.inputs:
-            return ""
-        return next((f"Which column is the {what}? Choose it under 2." for what in missing), "")
+        given = self.config or self.chosen["more"] or self.names != self.inputs
+        asked = {} if given or not self.table else {"column": "reading", self.axis: self.axis}
+        missing = [what for name, what in asked.items() if not self.chosen[name]]
+        return f"Which column is the {missing[0]}? Choose it under 2." if missing else ""
 
     def _traces(self) -> list[Asked]:
         """Return what is asked; a `BiogripError` says what the window does not do."""
@@ -163,20 +161,6 @@ class Window:
     def running_s(self) -> int:
         """How long the command runs, at least 1; 0 if it does not."""
         return int(time.time() - self.started) + 1 if self.work and self.work.poll() is None else 0
-
-    @property
-    def stale(self) -> bool:
-        """True of a result of other choices or files than those that are shown."""
-        return self.work is not None and self.command != self.ran
-
-    @property
-    def state(self) -> str:
-        """How far the command is, in a sentence."""
-        if self.work is None or self.stale:
-            return "Settings changed: identify again." * self.stale
-        if self.running_s:
-            return "Working on it …"
-        return "Ended early: see the result." if self.work.returncode else "Done: see the result."
 
     @property
     def of_table(self) -> bool:

@@ -29,15 +29,7 @@ from biogrip.config.case import SampleCase
 from biogrip.config.experiment_blocks import LARGEST_PARAMETER, LONGEST_S, SHORTEST_S
 from biogrip.config.loading import load, read_config_of, read_configs, trace_defaults
 from biogrip.config.messages import checked, with_numbers
-from biogrip.config.source import (
-    HOLD,
-    RAMP,
-    KeyPath,
-    Source,
-    keys_in,
-    overlaid,
-    read_source,
-)
+from biogrip.config.source import HOLD, RAMP, KeyPath, Source, keys_in, overlaid, read_source
 from biogrip.config.trace_blocks import TraceConfig
 from biogrip.errors import BiogripError
 from biogrip.physics.instruments import (
@@ -52,10 +44,7 @@ from biogrip.physics.instruments import (
 )
 from biogrip.physics.models import ALIASES, CANDIDATES
 from biogrip.physics.shapes import KNOWN_SHAPES
-from biogrip.traces.columns import (
-    held_unit,
-    place,
-)
+from biogrip.traces.columns import held_unit, place
 from biogrip.traces.measurement_block import ARRAYS, READINGS, ByOptions, MeasurementBlock
 from biogrip.traces.reader import Recording, read_recording, recording_of_arrays
 

@@ -86,6 +86,8 @@ _UNITS = {*TIME_UNITS, *_ELECTRICAL, *_COUNTED, *_READING_UNITS}
 _NUMBERED = re.compile(r"[ _]?(\d+|\(\d*\)|\[\d*\])$")
 # A number with what may be its unit behind it.
 _SIZED = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s*(.*?)\s*", re.I)
+_SUCKS = " A pressure sucks into a pipette, as by --shape 'pipette 2.5 um', with your own radius."
+_TO_STRAIN = " A length is a strain by a scale or shape, as by --shape 'cylinder 8 mm x 4 mm'."
 _MOST_LISTED = 50
 _LONGEST_SHOWN = 40
 _LONGEST_PATH = 200
@@ -119,9 +121,8 @@ def unit_of(
     # That of an axis may be shortened, as time_m.
     known = _READING_UNITS - {"1"} if allowed not in AXES.values() else ()
     kind = known_unit(end or _bare(below), known)
-    if given and not scaled:
-        in_row = in_row or known_unit(_bare(below), _READING_UNITS)
-        at_end = at_end or (kind if end else None)
+    in_row = in_row or (known_unit(_bare(below), _READING_UNITS) if given and not scaled else None)
+    at_end = at_end or (kind if end and given and not scaled else None)
     of_frequency = unit == "1/s" and "Hz" in allowed
     if of_frequency and not _ANGULAR.search(plain_name(column)):
         raise BiogripError(f"{where}: found the unit 1/s; allowed are rad/s or Hz, by {said_by}.")
@@ -130,10 +131,8 @@ def unit_of(
     if unit is None:
         found = f"the unit '{shortened(end)}' at the end of the name" if end else "no unit"
         row = f" (but '{shortened(below)}' below it)" if below else ""
-        how = f", or state one by {said_by}"
-        if not end:
-            row += f", neither stated (by {said_by}) nor at the end of the name" * (not kind)
-        how *= bool(end and not kind)
+        how = f", or state one by {said_by}" if end and not kind else ""
+        row += f", neither stated (by {said_by}) nor at the end of the name" * (not (end or kind))
         of_moduli = not end and allowed == MODULUS.units
         hint = " What is over another modulus, as G/G0, is a relative_modulus." * of_moduli
         if allowed == ROTATION.units:
@@ -141,9 +140,9 @@ def unit_of(
             example = f"{next(names, STRAIN.name)}={column}"
             hint = f" Which quantity is it? Say so, as by --reading {quote(example)}."
         elif allowed == STRAIN.units and kind in DISPLACEMENT.units:
-            hint = f" A length is a strain by the sample's shape, {_as_shape('cylinder')}."
+            hint = _TO_STRAIN
         elif allowed.keys() == FORCE.units.keys() and kind in STRESS.units:
-            hint = f" A pressure sucks at a sample, {_as_shape('pipette')}."
+            hint = _SUCKS
         raise BiogripError(f"{where}: found {found}{row}; allowed are {choices}{how}.{hint}")
     for other, said in ((at_end, "the name"), (in_row, "the row of units")):
         if other not in (None, unit):
@@ -233,19 +232,12 @@ def held_unit(value: float | str, controlled: Channel, by: str = "--hold") -> tu
         allowed = ", ".join(controlled.units)
         found = f"found the unit '{shortened(written)}' of a {controlled.title}"
         found = found if written else "found no unit"
-        others = [
-            name for name, it in INSTRUMENTS.items() if known_unit(written, it.controlled.units)
-        ]
+        others = [n for n, it in INSTRUMENTS.items() if known_unit(written, it.controlled.units)]
         other = f" Or say what is read, as by --reading {others[0]}=COLUMN." if others else ""
         if controlled.title == FORCE.name and known_unit(written, STRESS.units):
-            other = f" A pressure sucks at a sample, {_as_shape('pipette')}."
+            other = _SUCKS
         raise BiogripError(f"{by}: {found}, allowed are {allowed}.{other}")
     return number, unit
-
-
-def _as_shape(name: str) -> str:
-    """Return an option with a shape, whose sizes are an example."""
-    return f"as by --shape '{KNOWN_SHAPES[name].example}', with your own sizes"
 
 
 def _endings(column: str, *patterns: str) -> list[str]:
