@@ -116,7 +116,7 @@ def rise(path: Path) -> list[str]:
     inside_s = np.minimum(time_s, 3.0)
     spring = 5 * (np.exp(-(time_s - inside_s) / 5) - np.exp(-time_s / 5)) / 3
     strain, stress = 0.02 * inside_s / 3, steady(0.02 * (400 * inside_s / 3 + 500 * spring))
-    columns: list[Array] = [time_s, stress, strain, stress / np.maximum(strain, 1e-9)]
+    columns = time_s, stress, strain, stress / np.maximum(strain, 1e-9)
     write_trace(path, *columns, header="time_s,stress_Pa,strain,modulus_Pa")
     return ["--reading", "modulus=modulus_Pa", "--from", "3.1", *RELAXATION]
 
@@ -129,7 +129,7 @@ def unit_of_hold(path: Path) -> list[str]:
 
 def grows(path: Path) -> list[str]:
     """Noise of 5 % of a relaxation by a factor of ten."""
-    readings: Array = (40 + 500 * np.exp(-TIME_S / 5)) * (1 + 16 * (noisy(0 * TIME_S + 1) - 1))
+    readings = (40 + 500 * np.exp(-TIME_S / 5)) * (1 + 16 * (noisy(0 * TIME_S + 1) - 1))
     write_trace(path, TIME_S, readings, header="time_s,modulus_Pa")
     return ["--reading", "modulus", *RELAXATION, "--start", "0"]
 
@@ -141,8 +141,8 @@ def other_model(path: Path) -> list[str]:
 
 def other_zero(path: Path) -> list[str]:
     """Two steps, which tell a zero from a sample; the first comes with the first row."""
-    time_s: Array = np.arange(0.0, 30, 0.25)
-    load: Array = np.where(time_s >= 15.125, 2.0, 5.0)
+    time_s = np.arange(0.0, 30, 0.25)
+    load = np.where(time_s < 15.125, 5.0, 2.0)
     compliance = [
         1 / 500 - np.expm1(-np.maximum(t, 0) / 5) / 400 for t in (time_s, time_s - 15.125)
     ]
@@ -219,25 +219,18 @@ KINDS = {
     ),
     "names an option whose value only its reader knows": (
         *(" rad, or less with a given noise (--noise) ", ", or it is below the noise: say how"),
-        *("The noise differs from one part", "), and the values may be far off. Leave out what is"),
+        *("The noise differs from one part", "), and the values may be far off. Leave out what"),
         *("A ramp is given by --ramp DURATION", " % at the highest: correct for it, or leave"),
-        *(" times as much as the other: give standard", " A length is a strain by the sample's"),
+        *(" times as much as the other: give standard", " A length is a strain by a scale or"),
+        " A pressure sucks into a pipette",
         *(" Or say what is read, as by --reading ", ". Say which, as in --reading loss=COLUMN."),
         *("; give yours with --config.", " that was held, a column of it by --load, or a pro"),
         *(" s. Is the unit of time right?", " units. If these are what was repeated, cells"),
     ),
     "refuses": (
-        *(
-            "--output",
-            "--report",
-            "--csv",
-            "--plot",
-            " For several there is",
-            "--unit: found",
-            ": goes with --hold",
-        ),
-        *(": goes with --hold", "takes the shape of a tip"),
-        *("'; allowed is a table that `biogrip identify --csv` wrote"),
+        *("--output", "--report", "--csv", "--plot", "--unit: found", ": goes with --hold"),
+        *(" For several there is --report", "takes the shape of a tip"),
+        "'; allowed is a table that `biogrip identify --csv` wrote",
         *("with __use_yte__", "snakemake -j2 --configfile ", "--hold", "--ramp"),
     ),
 }
@@ -249,12 +242,14 @@ def test_every_hint_of_the_source_is_of_a_kind() -> None:
     unknown, seen = [], set()
     for path in sorted(folder.rglob("*.py")):
         if path.name in ("options.py", "cli.py", "library.py") or path.parent.name == "app":
-            # Options themselves, their help, how a notebook says them, and the window's choices.
+            # Options themselves, their help, and how a notebook or the window says them.
             continue
         tree = ast.parse(path.read_text())
-        documented = ast.Module, ast.ClassDef, ast.FunctionDef
-        bodies = [node for node in ast.walk(tree) if isinstance(node, documented)]
-        documents = [ast.get_docstring(node, clean=False) for node in bodies]
+        documents = [
+            ast.get_docstring(node, clean=False)
+            for node in ast.walk(tree)
+            if isinstance(node, ast.AsyncFunctionDef | ast.FunctionDef | ast.ClassDef | ast.Module)
+        ]
         for node in ast.walk(tree):
             text = getattr(node, "value", None)
             if not isinstance(node, ast.Constant) or not isinstance(text, str):
