@@ -69,7 +69,7 @@ def test_chi_squared_falls_by_twice_the_logarithm_of_how_much_likelier(known: fl
 def test_an_offset_is_not_told_from_what_yields_at_once_under_a_constant_torque() -> None:
     held = {"protocol": {"phases": [{"duration_s": 200.0, "torque_Nm": 1.6e-9}]}}
     (said,) = suspected(gripped(0, 0 * DRIFT, 200.0, model="kelvin_voigt", config=held))
-    assert "the instrument has an offset, or the sample yields at once" in said
+    assert "or the sample has an instantaneous compliance. Under" in said
     assert "identify the trace with" not in said
     assert "would be" not in said
 

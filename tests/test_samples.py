@@ -1,6 +1,7 @@
 """Several traces of one sample by the command: a column `sample`, and `--together`."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import pandas as pd
 import pytest
 
 from biogrip.cli import main
+from biogrip.command.words import agreement_in_words, for_a_paper, set_up_in_words
 
 OPTIONS = ["--reading", "strain", "--model", "zener_kelvin", "--no-compare"]
 
@@ -68,6 +70,19 @@ def test_its_json_has_its_traces(folder: Path) -> None:
     # A strain has no unit, and so has its noise.
     assert all("noise" in trace and "noise_rad" not in trace for trace in found["traces"])
     assert found["agreement"]["degrees_of_freedom"] == 3
+    assert agreement_in_words(found) == []
+
+
+def test_of_traces_that_agree_the_answer_is_said(folder: Path) -> None:
+    found: dict[str, Any] = json.loads((folder / "a none.identified.json").read_text())
+    (said,) = agreement_in_words(found)
+    assert said.startswith("The 2 traces agree with one linear sample (p = ")
+    low, high = map(float, re.findall(r"\((\S+) to (\S+)\) for .*a none 10.csv", said)[0])
+    assert low < 1 < high
+    sentences = for_a_paper(found)
+    assert len(sentences) == 4
+    assert all(it.endswith("n = 2 traces of one sample)") for it in sentences)
+    assert "under a stress of 5, 10 Pa from" in " ".join(set_up_in_words(found))
     assert {q["quantity"] for q in found["without_model"]["quantities"]} > {"J(10 s)"}
 
 
@@ -87,8 +102,8 @@ def test_its_page_has_one_figure_of_all_traces(folder: Path, tmp_path: Path) -> 
     page = tmp_path / "page.html"
     assert identify(tmp_path, *rows[:3], rows[-2], more=("--report", str(page))) == 0
     text = page.read_text()
-    # A picture of both; of each the fit and the profiles; of the trace alone the level.
-    assert text.count("data:image/png") == 1 + 2 * 2 + 1
+    # A picture of both; of each the fit and the profiles, twice; of the trace alone the level.
+    assert text.count("data:image/png") == 1 + 2 * 3 + 1
     assert text.count("<h3>Each trace by itself</h3>") == 1
 
 

@@ -72,8 +72,11 @@ def test_a_trace_may_stand_beside_a_table_that_does_not_name_it(here: Path) -> N
     write(here / "cells.tsv", HEADER, OTHER)
     status, printed, _ = identify("usual.csv", "cells.tsv", "--csv", "found.csv")
     assert status == 0
-    assumed = "the paper's gripper and the paper's protocol (200 s at 1.6e-09 N m, "
-    assert f"\nusual.csv: Assumed: {assumed}200 s at 3.2e-10 N m); give" in printed
+    assumed = "the gripper and the protocol (200 s at 1.6e-09 N m, "
+    assert (
+        f"\nusual.csv: Assumed: {assumed}200 s at 3.2e-10 N m) of the published gripper study; give"
+        in printed
+    )
     assert "other.csv: Assumed" not in printed
     rows = Path("found.csv").read_text().splitlines()
     starts = ["trace,dish,fit,", "usual.csv,,ok,", "other.csv,right,ok,"]

@@ -216,6 +216,13 @@ def test_anybody_can_use_it(
     opened = visit(page, color_scheme=scheme, viewport={"width": 400, "height": 800})
     assert opened.barriers(*rules) == []
     assert opened.page.evaluate("document.documentElement.scrollWidth") <= 400
+    table = opened.page.locator(".screen")
+    assert table.evaluate("it => it.scrollHeight <= it.clientHeight")
+    assert "gradient" in table.evaluate("it => getComputedStyle(it).backgroundImage")
+    whole = "every => every.every(it => it.getClientRects().length < 2)"
+    assert opened.page.locator(".wide td:not([colspan], .prose) code").evaluate_all(whole)
+    picture = opened.page.locator(".profiles").first
+    assert picture.evaluate("it => it.naturalHeight > 2 * it.naturalWidth")
     opened.page.emulate_media(media="print")
     opened.page.set_viewport_size({"width": 718, "height": 1000})
     assert opened.page.evaluate("document.documentElement.scrollWidth") <= 718

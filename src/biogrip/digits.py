@@ -112,6 +112,12 @@ def counted(count: object, noun: str) -> str:
     return f"{count} {noun}" if str(count) == "1" else f"{count} {noun}s"
 
 
+def times_noise(ratio: float, noise: str = "noise") -> str:
+    """Return a ratio to the noise in words: ``1.3 times the noise``."""
+    text = plain(ratio, 2)
+    return f"as large as the {noise}" if text == "1" else f"{text} times the {noise}"
+
+
 def with_unit(name: str, unit: str) -> str:
     """Return a name followed by its unit, if it has one: ``k (N/m)``, ``alpha``."""
     return f"{name} ({unit})" if unit else name

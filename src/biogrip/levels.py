@@ -34,7 +34,8 @@ TOO_LITTLE = 0.5
 """Misfit over a given noise below which that is doubted. Chosen: noise is rarely known better."""
 
 CLEARLY = 3.0
-"""Growth of noise from which on its share is known, and unweighted fits are not compared."""
+"""Growth of noise from which on its share is known, and unweighted fits are not compared; misfit
+over the noise that is told first, whatever explains it."""
 
 FEWEST_STEPS = 6
 """Extent of a record in steps of its rounding from which it may be a smooth course in coarse steps;

@@ -8,7 +8,7 @@ from matplotlib.patches import Rectangle
 
 from biogrip.figures import style
 from biogrip.figures.fit import FittedTrace, draw_fit, scale_of
-from biogrip.figures.likelihood import draw_profile
+from biogrip.figures.likelihood import draw_profile, draw_profiles_of
 from biogrip.figures.style import figure, save, styled
 from biogrip.physics.instruments import MODULUS
 from biogrip.physics.models import MODELS
@@ -163,3 +163,19 @@ def test_points_beyond_an_axis_are_triangles_at_its_edge() -> None:
     np.testing.assert_array_equal(drawn_at["o"], points[:2])
     edges = {"v": [[3, 0]], "^": [[4, 5]], ">": [[9, 2]]}
     assert {marker: at.tolist() for marker, at in drawn_at.items() if marker != "o"} == edges
+
+
+@pytest.mark.parametrize(("certainty", "drawn"), [(10.8, True), (14.0, False)])
+def test_the_legend_of_profiles_names_what_is_drawn(certainty: float, *, drawn: bool) -> None:
+    values = np.geomspace(0.5, 2.0, 41)
+    profile = {"values": values.tolist(), "increases": (30 * np.log(values) ** 2).tolist()}
+    ends = {"low": 0.7, "high": 1.4, "excluded": [], "verdict": "determined"}
+    item = {"quantity": "k", "symbol": "k", "unit": "Pa", "profile": profile, **ends}
+    judged = {"quantities": [item] * 3, "threshold": 3.84, "confidence": 0.95}
+    for stacked in (False, True):
+        found = draw_profiles_of({**judged, "certainty": certainty}, stacked=stacked)
+        said = [text.get_text() for text in found.legends[0].get_texts()]
+        assert "95 %: limits" in said
+        assert ("99.9 %: needed to close a side" in said) == drawn
+        rows = {axes.get_position().y0 for axes in found.axes}
+        assert len(rows) == (3 if stacked else 1)

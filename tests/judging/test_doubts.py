@@ -8,6 +8,7 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import chi2
 
+from biogrip.command.words import in_words
 from biogrip.judging.doubts import (
     DOUBT,
     DOUBTFUL,
@@ -25,6 +26,7 @@ from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.noise import AR1, Noise, NoiseModel, Outliers, add_noise
 from tests.helpers.default import seen
 from tests.helpers.identified import told
+from tests.helpers.places import ROOT
 from tests.helpers.problems import MODEL, clean, likelihood_of, pose_noisy, posed_for, rotation
 
 
@@ -238,3 +240,15 @@ def test_rounding_rejects_no_trace_that_has_long_come_to_rest() -> None:
     assert found.status == DOUBTFUL
     limits, truth = found.to_frame().loc[["k_s", "k_v", "c_v"]], [2000, 4000 / 3, 20000 / 3]
     assert np.all((limits["low"].fillna(0.0) < truth) & (limits["high"].fillna(np.inf) > truth))
+
+
+def test_of_mucus_the_misfit_comes_before_the_reading_that_does_not_fit() -> None:
+    time_s, compliance = np.loadtxt(
+        ROOT / "data" / "measured" / "mucus.csv", delimiter=",", skiprows=1
+    ).T
+    found = told(time_s, compliance, reads="compliance", model="springpot_beside_damper")
+    misfit, first = found.data["reasons"][:2]
+    assert misfit.startswith("The RMS residual is 3.9 times the noise of the trace; ")
+    assert first.startswith("The first reading (0.5 s) does not fit the rest")
+    assert "Leave out that reading (" in first
+    assert "no linear sample fits to the noise; the closest ones, " in in_words(found.data)

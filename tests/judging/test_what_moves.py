@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
+from biogrip.command.words import error_in_words
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import fit_from, identify_from
 from biogrip.judging.diagnosis import Diagnosis, diagnose
@@ -95,7 +96,7 @@ def test_a_refit_moves_each_quantity_by_what_is_said(reads: str) -> None:
         for finding in diagnosis.findings:
             log, label = finding.quantity.log, finding.quantity.label
             moved = 0.5 * (log(ends[0]) - log(ends[1]))
-            assert move.changes[label] == pytest.approx(moved, rel=0.05, abs=2e-4), (move, label)
+            assert np.log1p(move.changes[label]) == pytest.approx(moved, rel=0.05, abs=2e-4), move
 
 
 @pytest.mark.parametrize("reads", INSTRUMENTS)
@@ -116,7 +117,7 @@ def test_any_linear_sample_moves_as_its_refit(reads: str) -> None:
         for own in found.told:
             label = own.quantity
             if own.value and own.kind == "level" and label in above and label in below:
-                moved = 0.5 * (above[label] - below[label]) / own.value
+                moved = np.expm1(0.5 * (above[label] - below[label]) / own.value)
                 assert move.changes[label] == pytest.approx(moved, rel=0.05, abs=5e-4), move
 
 
@@ -126,3 +127,33 @@ def test_a_zero_is_a_spring_of_a_held_strain() -> None:
     zero = next(move for move in judged("modulus").moves if move.name == "zero")
     assert zero.changes["k_p"] == pytest.approx(0.01 * clean.max() / 100.0, rel=1e-2)
     assert max(abs(zero.changes["k"]), abs(zero.changes["c"])) < 1e-4
+
+
+@pytest.mark.parametrize(("every_s", "first_s", "rise_s"), [(0.5, 0.5, 0.5), (0.5, 0.2, 0.2)])
+def test_what_is_printed_is_off_as_said_and_a_rise_ends_before_a_reading(
+    every_s: float, first_s: float, rise_s: float
+) -> None:
+    """Creep under a stress with a rise, fitted as a step and, as it was, with its rise."""
+    times: Array = np.float64(first_s) + every_s * np.arange(100)
+    values = {"k_s": 80.0, "k_v": 100.0, "c_v": 200.0}
+    sample, strain = Sample("zener_kelvin"), INSTRUMENTS["strain"]
+    step = set_up(strain, (hold(51.0, 1.0),), sample)
+    rising = set_up(strain, (ramp(rise_s, 0.0, 1.0), hold(51.0 - rise_s, 1.0)), sample)
+    clean = simulate(rising, values, times)
+    noise = 1e-4 * np.max(clean) * np.random.default_rng(1).standard_normal(len(times))
+    of_step, of_rise = (
+        diagnose(problem, identify_from(problem, step.logs(values)), confidence=0.95)
+        for problem in (own.of(times, clean + noise) for own in (step, rising))
+    )
+    move = next(move for move in of_step.moves if move.name == "rise")
+    assert f"took {rise_s:g} s" in move.words
+    printed, known = (own.findings[2].value for own in (of_step, of_rise))
+    assert error_in_words(move.changes["c_v"]).endswith("low" if printed < known else "high")
+    assert 1 + move.changes["c_v"] == pytest.approx(printed / known, rel=0.02)
+
+
+def test_beyond_a_factor_of_two_no_size_is_said() -> None:
+    said = [error_in_words(by) for by in (-0.93, -0.5, -1e-7, 0.085, 9.7)]
+    assert said[0] == "as less than half what it is"
+    assert said[1:4] == ["50 % too low", "right", "8.5 % too high"]
+    assert said[4] == "as more than twice what it is"

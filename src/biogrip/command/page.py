@@ -51,14 +51,15 @@ _BAND, _FIT_IN = 25, (4.4, 3.4)
 
 
 def trace_pictures(diagnosis: Diagnosis, data: Mapping[str, Any]) -> list[str]:
-    """Return pictures of a trace as data URLs: the fit with its residuals, and all profiles.
+    """Return pictures of a trace as data URLs: the fit with its residuals; profiles, and stacked.
 
-    A third one is of the level over time, as far as that is told without a model.
+    A fourth one is of the level over time, as far as that is told without a model.
     """
     drawn, told = draw_best(diagnosis), data["without_model"]["quantities"]
     with style.styled():
         more = [draw_level(diagnosis, data)] if told and diagnosis.recording else []
-        return [address(picture) for picture in (drawn, draw_profiles_of(data), *more)]
+        profiles = [draw_profiles_of(data, stacked=stacked) for stacked in (False, True)]
+        return [address(picture) for picture in (drawn, *profiles, *more)]
 
 
 def draw_level(diagnosis: Diagnosis, data: Mapping[str, Any]) -> Figure:
@@ -205,7 +206,8 @@ def write_page(outcome: Outcome, page: Path) -> None:
     outcomes += [(trace, FAILED, reason) for trace, reason in outcome.refused.items()]
     further = outcome_in_words(outcomes) if several else preferred_in_words(traces[0])
     set_up = together(map(set_up_in_words, traces))
-    assumed: dict[str, dict[str, Any]] = {data["trace"]: data["assumed"] for data in traces}
+    singles = [single for data in traces for single in data.get("traces", [data])]
+    assumed: dict[str, dict[str, Any]] = {single["trace"]: single["assumed"] for single in singles}
     shared = common([*assumed.values()])
     beyond_shared = {trace: _as_yaml(beyond(block, shared)) for trace, block in assumed.items()}
     text = (

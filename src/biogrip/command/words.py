@@ -8,7 +8,16 @@ from typing import Any
 
 import biogrip.levels as levels
 from biogrip import __version__
-from biogrip.digits import counted, instant, legible, plain, with_limits, with_unit, within_limits
+from biogrip.digits import (
+    counted,
+    instant,
+    legible,
+    plain,
+    times_noise,
+    with_limits,
+    with_unit,
+    within_limits,
+)
 from biogrip.judging.doubts import DOUBT, DOUBTFUL, HARMLESS, OK, REJECTED, REJECTION
 from biogrip.judging.verdicts import FIT_REJECTED, NOT_DETERMINED
 from biogrip.judging.without_model import BEYOND, EXPONENT, FLOW, LEVEL, LOSS
@@ -26,7 +35,7 @@ _LINES = 5
 _MOST_NAMED = 5
 # Share of a quantity below which no error of the instrument is worth a line.
 _LEAST_MOVE = 1e-4
-_LIKELIHOOD_RATIO = "That they are of one sample was tested by likelihood ratios."
+_LIKELIHOOD_RATIO = "That they are of one sample was tested by two likelihood ratios (Bonferroni)."
 _NUMBER = re.compile(r"\d[\d.e+-]*")
 MEANS = {
     OK: "the residuals look like noise",
@@ -44,6 +53,7 @@ def in_words(found: Mapping[str, Any]) -> str:
     lines = [
         f"{visible(found['trace'])}: fit {found['fit']}: {MEANS[found['fit']]}.",
         *(f"  {visible(reason)}" for reason in found["reasons"]),
+        *agreement_in_words(found),
         misfit_in_words(found),
         *(without_model_in_words(found) if rejected else []),
         f"{found['model_title']}, {100 * found['confidence']:g} % limits:",
@@ -64,6 +74,12 @@ def in_words(found: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
+def agreement_in_words(found: Mapping[str, Any]) -> list[str]:
+    """Return a sentence that several traces agree with one sample; else it is among reasons."""
+    agreed = "traces" in found and found["fit"] != REJECTED
+    return [visible(found["agreement"]["in_words"])] if agreed else []
+
+
 def terms_of(found: Mapping[str, Any]) -> list[str]:
     """Return lines on the noise of a trace, and on what of its instrument was fitted along."""
     return [misfit_in_words(found), *fitted_in_words(found)[len(given_in_words(found)) :]]
@@ -72,7 +88,7 @@ def terms_of(found: Mapping[str, Any]) -> list[str]:
 def without_model_in_words(found: Mapping[str, Any]) -> list[str]:
     """Return lines on what any linear sample would show."""
     own, told = found["without_model"], foremost(found)
-    left = f"{plain(own['times_noise'], 2)} times the noise"
+    left = times_noise(own["times_noise"])
     if not _by_noise(found):
         left = f"{in_unit(own['misfit_rad'], found)}, {left}"
     if not told:
@@ -81,8 +97,10 @@ def without_model_in_words(found: Mapping[str, Any]) -> list[str]:
         return [f"Model-free: {too_large if own['times_noise'] < 1 else why}."]
     width = max(len(each["quantity"]) for each in told)
     lines = (f"  {each['quantity']:<{width}}  {each['in_words']}" for each in told)
-    any_sample = "Model-free, any linear viscoelastic sample that fits"
-    return [f"{any_sample} (least RMS residual {left}), has:", *lines]
+    any_sample = f"any linear viscoelastic sample that fits (least RMS residual {left}), has"
+    if not own["is_linear"] or own["times_noise"] > levels.CLEARLY:
+        any_sample = f"no linear sample fits to the noise; the closest ones, {left}, have"
+    return [f"Model-free, {any_sample}:", *lines]
 
 
 def rows_of_moves(found: Mapping[str, Any]) -> list[tuple[str, dict[str, float]]]:
@@ -96,8 +114,17 @@ def rows_of_moves(found: Mapping[str, Any]) -> list[tuple[str, dict[str, float]]
     return [*rows.items()]
 
 
+def error_in_words(by: float) -> str:
+    """Return how far a printed value is off; beyond a factor of two a linear estimate ends."""
+    if by > 1 or by < -0.5:
+        return f"as {'more than twice' if by > 0 else 'less than half'} what it is"
+    if abs(by) < _LEAST_MOVE:
+        return "right"
+    return f"{plain(100 * abs(by), 2)} % too {'low' if by < 0 else 'high'}"
+
+
 def moves_in_words(found: Mapping[str, Any]) -> list[str]:
-    """Return a line on what a zero moves most, and what is moved most, by the model and by any."""
+    """Return a line on what a zero makes most wrong, and what is most wrong, by model and any."""
     rows, of_model = rows_of_moves(found), {each["quantity"] for each in found["quantities"]}
     said: dict[str, None] = {}
     for some, by_model in ((rows[:1], True), (rows, True), (rows, False)):
@@ -105,8 +132,7 @@ def moves_in_words(found: Mapping[str, Any]) -> list[str]:
         chosen = [each for each in every if (each[1] in of_model) == by_model]
         by, name, words = max(chosen, key=lambda it: abs(it[0]), default=(0.0, "", ""))
         if abs(by) > _LEAST_MOVE:
-            way = f"{'falls' if by < 0 else 'rises'} by {plain(100 * abs(by), 2)} %"
-            said[f"{name} {way} if {words}"] = None
+            said[f"{name} is printed {error_in_words(by)} if {words}"] = None
     return [f"{'; '.join(said)}."] if said else []
 
 
@@ -139,8 +165,7 @@ def misfit_in_words(found: Mapping[str, Any]) -> str:
         few = found["misfit_rad"] < levels.TOO_LITTLE * found["scatter_rad"]
         why = " (too large, as few readings follow the course)" if few else ""
         return f"{said}, {noise}{why}, RMS residual {in_unit(found['misfit_rad'], found)}"
-    ratio = plain(found["misfit_rad"] / found["scatter_rad"], 2)
-    return f"{said}, RMS residual {ratio} times the {noise}"
+    return f"{said}, RMS residual {times_noise(found['misfit_rad'] / found['scatter_rad'], noise)}"
 
 
 def _by_noise(found: Mapping[str, Any]) -> bool:
@@ -217,7 +242,8 @@ def for_a_paper(found: Mapping[str, Any]) -> list[str]:
     """
     if found["fit"] != OK:
         return []
-    sentences = []
+    sentences, traces = [], len(found.get("traces", [found]))
+    count = f"n = {counted(traces, 'trace')}{' of one sample' * (traces > 1)}"
     for each in found["quantities"]:
         low, high, confidence = each["low"], each["high"], 100 * found["confidence"]
         if low is None and high is None:
@@ -230,7 +256,7 @@ def for_a_paper(found: Mapping[str, Any]) -> list[str]:
             numbers = within_limits(each["value"], low, high)
         provided = f", provided {each['provided']}" if each["provided"] else ""
         value, reach = f"{numbers[0]} {each['unit']}".rstrip(), " to ".join(numbers[1:])
-        within = f"{confidence:g} % {f'{kind} {reach}'.rstrip()}, n = 1 trace{provided}"
+        within = f"{confidence:g} % {f'{kind} {reach}'.rstrip()}, {count}{provided}"
         sentences.append(f"{each['quantity']} {sign} {value} ({within})")
     return sentences
 
@@ -254,6 +280,7 @@ def in_columns(found: Sequence[Mapping[str, Any]], refused: Mapping[str, str]) -
         lines.append(f"{100 * found[0]['confidence']:g} % limits; ? where the trace tells nothing.")
         fits = {each["fit"] for each in found}
         lines += [f"Fit {fit}: {means}." for fit, means in MEANS.items() if fit in fits]
+        lines += _once(found, agreement_in_words)
         lines += [*one_sided_in_words(found), *_once(found, lambda each: [each["limits"]])]
         lines += _once(found, _provided)
         lines += _once(found, given_in_words)
@@ -322,12 +349,13 @@ def columns_of(found: Iterable[Mapping[str, Any]]) -> dict[str, str]:
 
 def taken_for_granted(found: Mapping[str, Any]) -> str:
     """Return a sentence naming defaults (gripper, protocol) that the user did not replace."""
-    said = [f"the paper's {name}" for name in found["by_default"]]
+    said = [f"the {name}" for name in found["by_default"]]
     if "protocol" in found["by_default"]:
         phases = found["assumed"]["protocol"]["phases"]
         held = (f"{phase['duration_s']:g} s at {phase['torque_Nm']:g} N m" for phase in phases)
         said[-1] += f" ({', '.join(held)})"
-    return f"Assumed: {' and '.join(said)}; give yours with --config."
+    whose = "of the published gripper study"
+    return f"Assumed: {' and '.join(said)} {whose}; give yours with --config."
 
 
 def limits_in_short(quantity: Mapping[str, Any]) -> str:
@@ -447,15 +475,23 @@ def _first_of(name: str, _: str, reason: str) -> str:
 
 
 def together(several: Iterable[Sequence[str]]) -> list[str]:
-    """Return what several traces say once: of sentences that begin alike, the first."""
+    """Return what several traces say once: of sentences that begin alike, the first.
+
+    Few say all of their numbers: "a stress of 2, 5, 10 Pa".
+    """
     by_start: dict[tuple[str, ...], dict[str, None]] = {}
     for sentences in several:
         for each in sentences:
             by_start.setdefault(tuple(each.split()[:4]), {})[each] = None
     said = []
     for first, *others in by_start.values():
-        alike = f" ({len(others)} likewise with other numbers)." if others else "."
-        said.append(first.removesuffix(".") + alike)
+        every = [sentence.split() for sentence in (first, *others)]
+        if len({*map(len, every)}) > 1 or len(every) > _MOST_NAMED:
+            alike = f" ({len(others)} likewise with other numbers)."
+            said.append(first.removesuffix(".") + alike)
+        else:
+            words = (", ".join(dict.fromkeys(same)) for same in zip(*every, strict=True))
+            said.append(" ".join(words))
     return said
 
 

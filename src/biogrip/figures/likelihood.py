@@ -27,27 +27,35 @@ def draw_profiles_of(
     others: Sequence[Mapping[str, Any]] = (),
     title: str = "",
     truth_of: Mapping[str, float] | None = None,
+    *,
+    stacked: bool = False,
 ) -> Figure:
-    """Draw profiles of verdicts, beside others that are expected and true parameters."""
+    """Draw profiles of verdicts, beside others that are expected and true parameters.
+
+    Stacked, they are read on a telephone.
+    """
     foreseen = {item["quantity"]: item for item in others[0]["quantities"]} if others else {}
     quantities = judged["quantities"]
-    drawn, grid = style.row_of_panels(len(quantities), 2.5, sharey=True)
+    drawn, grid = style.row_of_panels(len(quantities), 2.5, sharey=True, stacked=stacked)
     for index, (axes, item) in enumerate(zip(grid, quantities, strict=True)):
         if item["quantity"] in foreseen:
             curve = _curve(foreseen[item["quantity"]]["profile"])
             axes.plot(*curve, color=style.GREY, label="expected without noise")
         draw_profile(axes, item)
         for increase, look, label in (
-            (judged["threshold"], "--", f"{100 * judged['confidence']:g} %"),
-            (judged["certainty"], ":", f"{100 * CERTAIN:g} %, to close a side"),
+            (judged["threshold"], "--", f"{100 * judged['confidence']:g} %: limits"),
+            (judged["certainty"], ":", f"{100 * CERTAIN:g} %: needed to close a side"),
         ):
-            axes.axhline(increase, color=style.TARGET, linestyle=look, linewidth=0.7, label=label)
+            if increase < _HIGHEST_INCREASE:
+                axes.axhline(increase, color=style.TARGET, ls=look, linewidth=0.7, label=label)
         truth = quantity_value(item["quantity"], truth_of or {})
         if truth is not None:
             axes.axvline(truth, color=style.TARGET, linewidth=0.7, label="truth")
         style.panel(axes, ascii_letters[index], item["verdict"], 40)
     grid[0].set_ylabel("rise of χ²")
-    drawn.legend(*grid[0].get_legend_handles_labels(), loc="outside lower right", ncols=5)
+    drawn.legend(
+        *grid[0].get_legend_handles_labels(), loc="outside lower right", ncols=1 if stacked else 5
+    )
     drawn.suptitle(style.literal(title), x=0.01, ha="left", fontsize=8)
     return drawn
 

@@ -83,12 +83,12 @@ def figure(width_in: float, height_in: float) -> Figure:
 
 
 def row_of_panels(
-    count: int, height_in: float, *, sharey: bool = False
+    count: int, height_in: float, *, sharey: bool = False, stacked: bool = False
 ) -> tuple[Figure, list[Axes]]:
-    """Return a page-wide figure with panels in one or more rows."""
-    rows = -(-count // _MOST_SIDE_BY_SIDE)
+    """Return a page-wide figure with panels in one or more rows, or a narrow one of a column."""
+    rows = count if stacked else -(-count // _MOST_SIDE_BY_SIDE)
     columns = -(-count // rows)
-    drawn = figure(PAGE_IN, rows * (height_in - _LEGEND_IN) + _LEGEND_IN)
+    drawn = figure(COLUMN_IN if stacked else PAGE_IN, rows * (height_in - _LEGEND_IN) + _LEGEND_IN)
     grid = list(drawn.subplots(rows, columns, sharey=sharey, squeeze=False).ravel())
     for axes in grid[count:]:
         axes.set_axis_off()

@@ -8,7 +8,7 @@ import numpy as np
 from biogrip.digits import counted, plain, round_increase
 from biogrip.fit.experiment import Experiment
 from biogrip.judging.diagnosis import Diagnosis
-from biogrip.judging.doubts import REJECTED, REJECTION, find_reasons, order_notes
+from biogrip.judging.doubts import NOT_LINEAR, REJECTED, REJECTION, find_reasons, order_notes
 from biogrip.judging.verdicts import FIT_REJECTED, Finding
 from biogrip.physics.noise import within
 from biogrip.physics.simulation import simulated_response
@@ -85,6 +85,8 @@ def trace_data(diagnosis: Diagnosis) -> dict[str, Any]:
     instrument, said = experiment.instrument, judged_data(diagnosis)
     rejected = said["fit"] == REJECTED
     spread_s = _spread_s(recording, experiment)
+    # No linear model is advised for a sample that is not linear.
+    linear = all(note.about != NOT_LINEAR for note in diagnosis.notes)
     return {
         "model": experiment.model.name,
         "model_title": experiment.model.title,
@@ -97,6 +99,7 @@ def trace_data(diagnosis: Diagnosis) -> dict[str, Any]:
         **said,
         "noise_model": fit.noise_data(),
         **models.data(rejected=rejected),
+        **({} if linear else {"advice": None, "preferred_model": None}),
         "moduli": None if rejected else moduli_between(*spread_s, diagnosis),
     }
 

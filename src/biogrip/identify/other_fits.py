@@ -376,11 +376,11 @@ def _note(trace: Trace, diagnosis: Diagnosis, other: _Other, judged: Diagnosis) 
             f"line, and the trace cannot tell which it is: a {controlled} that changes would."
         )
     elif not drifts and is_held(torque, recording.time_s):
-        yields = "holds a load" if instrument.deforms else "yields at once"
+        yields = "holds a load" if instrument.deforms else "has an instantaneous compliance"
         text = (
             f"A constant, fitted along, {better}: the instrument has an offset, or the sample "
-            f"{yields}. Under this {controlled} both give the same constant: readings before the "
-            "start would tell."
+            f"{yields}. Under this {controlled} both give the same constant: readings before "
+            "loading would tell them apart."
         )
     else:
         terms = "An offset and a drift" if many else "A drift" if drifts else "An offset"

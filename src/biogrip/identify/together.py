@@ -66,6 +66,7 @@ class Together(Diagnosis):
         ratios = agreement.ratios(np.full(count, 1 / count)).tolist()
         odd = None if agreement.odd is None else self.names[agreement.odd]
         told |= {"odd": odd, "stiffness_over_mean": ratios}
+        told["in_words"] = _compared(self.names, agreement)
         return {
             **judged_data(self),
             **{"noise_model": None, "preferred_model": None, "advice": None},
@@ -148,13 +149,20 @@ def _with_start(diagnosis: Diagnosis) -> Likelihood:
     return replace(likelihood, problem=with_uncertain_start(*given))
 
 
+def _compared(names: Sequence[str], agreement: Agreement) -> str:
+    """Say whether traces agree, by which test, and the ratios of stiffness."""
+    verdict = f"The {len(names)} traces agree with" if agreement.holds else "The traces are not of"
+    rise = f"χ² rises by {plain(agreement.increase)} with {agreement.freedom} degrees of freedom"
+    of_two = f"{p_value(agreement.chance)}, twice the smaller of two tests, of all and of stiffness"
+    ratios = zip(names, agreement.ratios(np.eye(len(names))[0]), strict=True)
+    told = [f"{with_limits(*ratio)} for {name}" for name, ratio in ratios]
+    stiffness = f"The stiffness over that of {names[0]} is {' and '.join(told[1:])}."
+    return f"{verdict} one linear sample ({of_two}; {rise}). {stiffness}"
+
+
 def _differences(names: Sequence[str], diagnoses: Sequence[Diagnosis], agreement: Agreement) -> str:
     """Say that traces do not agree, which differs, and whether that follows load or order."""
-    rise = f"χ² rises by {plain(agreement.increase)} with {agreement.freedom} degrees of freedom"
-    said = f"The traces are not of one linear sample ({p_value(agreement.chance)}; {rise}). "
-    ratios = zip(names, agreement.ratios(np.eye(len(names))[0]), strict=True)
-    told = [f"{with_limits(*ratio)} of {name}" for name, ratio in ratios]
-    said += f"The stiffness, over that of {names[0]}, is {' and '.join(told[1:])}. "
+    said = f"{_compared(names, agreement)} "
     if agreement.odd is not None:
         said += f"Without {names[agreement.odd]} the others agree. "
     if not agreement.in_stiffness:

@@ -42,7 +42,7 @@ HARMLESS, DOUBT, REJECTION = "harmless", "doubt", "rejection"
 OK, DOUBTFUL, REJECTED = "ok", "doubtful", "rejected"
 """Status of a fit by the heaviest of its notes."""
 
-ROUNDED, RING = "rounded", "ring"
+ROUNDED, RING, NOT_LINEAR = "rounded", "ring", "not linear"
 """What notes are about that others depend on."""
 
 _STATUS = {HARMLESS: OK, DOUBT: DOUBTFUL, REJECTION: REJECTED}
@@ -58,7 +58,7 @@ class Note:
     text: str
     """The sentence."""
     about: str = ""
-    """`ROUNDED` or `RING`, if it is about that."""
+    """`ROUNDED`, `RING` or `NOT_LINEAR`, if it is about that."""
 
 
 def compute_status(notes: Sequence[Note]) -> str:
@@ -212,7 +212,8 @@ def _find_notes(left: _Left, misfit: Note | None = None) -> list[Note]:
             # Nothing has a spectrum, or wanders, over places of two moduli.
             colour = colour[: left.correlation[1] < levels.FALSE_ALARM]
         changes = _about_changes(left, coloured=bool(colour))
-        doubts += left.lines or changes or ([] if misfit else colour)
+        # The misfit is said once.
+        doubts += left.lines or changes[-1:] if misfit else left.lines or changes or colour
     notes += (Note(DOUBT, doubt) for doubt in doubts)
     if notes and in_time and not residuals.coloured and compute_status(notes) == DOUBTFUL:
         notes.append(
@@ -289,7 +290,7 @@ def name_suspects(residuals: Residuals, times: float, scale: float) -> str:
     if residuals.course.sweeps:
         gives = "has both moduli (Kramers-Kronig)"
         _, culprits = whiteness.find_inertia(residuals, *left)
-    noises = counted(least, "noise")
+    noises = "the noise" if least == "1" else f"{least} times the noise"
     inadequate = f"the model is not adequate, as a linear sample of another kind fits to {noises}"
     if whiteness.correlated(*left)[1] >= levels.FALSE_ALARM:
         if other > levels.TOO_MUCH and times < other * levels.TOO_MUCH:
@@ -353,13 +354,23 @@ def _about_changes(left: _Left, *, coloured: bool) -> list[str]:
     step = whiteness.find_step(residual, basis, lambda it: trace.condensed.cleared(it) / growth)
     if step and step.chance < levels.FALSE_ALARM and not (coloured and _is_coloured(step)):
         before_s, after_s = trace.time_s[step.before - 1 : step.before + 1]
-        size = plain(-step.size, 2)
-        unit = f" {residuals.instrument.read.unit}".rstrip()
-        return [
-            f"The readings change at about {plain(0.5 * (before_s + after_s))} s, as by a step of "
-            f"{size}{unit}: white noise hardly does that ({p_value(step.chance)}), and the values "
-            "may be far off. Leave out what is before or after (--from, --until)."
-        ]
+        size = f"{plain(-step.size, 2)} {residuals.instrument.read.unit}".rstrip()
+        what = f"readings change at about {plain(0.5 * (before_s + after_s))} s"
+        away = "what is before or after (--from, --until)"
+        if step.before == 1:
+            what, away = (
+                f"first reading ({plain(before_s)} s) does not fit the rest",
+                "that reading (--from)",
+            )
+        text = (
+            f"white noise hardly does that ({p_value(step.chance)}), and the values may be far off"
+        )
+        said = [f"The {what}, as by a step of {size}: {text}. Leave out {away}."]
+        if left.times > levels.CLEARLY:
+            least = plain(fit_any_sample(residuals).sd / left.scale, 2)
+            rms = f"The RMS residual is {plain(left.times, 2)} times the noise of the trace"
+            said.insert(0, f"{rms}; the closest linear sample leaves {least} times the noise.")
+        return said
     split = middle_of(residuals)
     chance = 1.0 if coloured else whiteness.compare_halves(residual, basis, split)
     if chance >= levels.FALSE_ALARM:

@@ -14,7 +14,15 @@ import biogrip.levels as levels
 from biogrip.arrays import Array
 from biogrip.digits import p_value, plain, with_limits
 from biogrip.fit.noise_model_fit import absorbed
-from biogrip.judging.doubts import DOUBT, MANY, REJECTED, REJECTION, Note, compute_status
+from biogrip.judging.doubts import (
+    DOUBT,
+    MANY,
+    NOT_LINEAR,
+    REJECTED,
+    REJECTION,
+    Note,
+    compute_status,
+)
 from biogrip.judging.likelihood import Likelihood
 from biogrip.physics.noise import without
 from biogrip.physics.protocol import Course, superposed
@@ -66,13 +74,14 @@ def notes_on_gains(likelihood: Likelihood, notes: list[Note]) -> Iterator[Note]:
     instrument = residuals.instrument
     unit = f" {instrument.controlled.unit}".rstrip()
     said = " and ".join(
-        f"{with_limits(gain, gain - error, gain + error)} at {plain(level)}{unit}"
+        f"at {plain(level)}{unit} is {with_limits(gain, gain - error, gain + error)}"
         for (level, _), gain, error in zip(held[1:], gains, errors, strict=True)
     )
     yield Note(
         REJECTION if compute_status(notes) == REJECTED else DOUBT,
-        f"Over the {instrument.controlled.name} the {instrument.read.name} is {said} times that at "
-        f"{plain(held[0][0])}{unit} ({p_value(chance)}): the sample is not linear.",
+        f"{instrument.read.title.capitalize()} per {instrument.controlled.name} {said} of that "
+        f"at {plain(held[0][0])}{unit} ({p_value(chance)}): the sample is not linear.",
+        NOT_LINEAR,
     )
 
 

@@ -1,4 +1,4 @@
-"""What moves the result: by how much each quantity is off if the instrument is.
+"""Errors of the printed values: by how much each quantity is off if the instrument is.
 
 Limits take zero, gain, clock and steps of an instrument as exact. If these add d to the readings, a
 fit's parameters move by
@@ -7,8 +7,9 @@ fit's parameters move by
 
 to first order: a step of Gauss-Newton. J has the slopes of the response by the log-parameters in
 white noise of the standard deviation s; the s^2 is a prior of one e-fold, as in
-`Likelihood.deviation`. Any linear sample is fitted again. No test is asked if it would see the
-error: who knows the instrument knows how large it is.
+`Likelihood.deviation`. Any linear sample is fitted again. What is printed is then too large by the
+exponential of that, less one. No test is asked if it would see the error: who knows the instrument
+knows how large it is.
 """
 
 import math
@@ -23,8 +24,9 @@ from biogrip.judging.quantities import Quantity
 from biogrip.physics.protocol import is_storage, spacing_at
 from biogrip.physics.residuals import Residuals
 
-# Error of a zero and of a gain, as a share; of a phase, in rad; last decimal of what they move.
-_WRONG_SHARE, _WRONG_PHASE, _DECIMALS = 0.01, np.radians(1.0), 6
+# Error of a zero and of a gain, as a share; of a phase, in rad; last decimal of what they move, and
+# most e-folds.
+_WRONG_SHARE, _WRONG_PHASE, _DECIMALS, _MOST = 0.01, np.radians(1.0), 6, 10.0
 
 Response = Callable[[Residuals], Array]
 """What a sample shows, (n_samples,), under the protocol and at the times of residuals."""
@@ -51,7 +53,7 @@ class Move:
     words: str
     """Its clause."""
     changes: dict[str, float]
-    """Change of each quantity over its value, by its label."""
+    """Error of each printed quantity over its value, by its label: 0.1 if it is 10 % too high."""
 
 
 def find_mistakes(residuals: Residuals, response: Response) -> Iterator[Mistake]:
@@ -75,12 +77,15 @@ def find_mistakes(residuals: Residuals, response: Response) -> Iterator[Mistake]
     zero = np.full(len(time_s), _WRONG_SHARE * float(np.max(np.abs(shown))))
     yield Mistake("zero", "the zero is 1 % of the peak too high", zero)
     yield Mistake("gain", f"{gain}, or the {controlled} 1 % too small", _WRONG_SHARE * shown)
-    interval_s = spacing_at(time_s, 0.0)
+    interval_s, first_s = spacing_at(time_s, 0.0), float(time_s[time_s > 0][0])
     earlier = residuals.later(-interval_s)
-    words = f"the {controlled} comes {interval_s:.2g} s earlier"
-    yield Mistake("clock", words, response(earlier) - shown)
-    slower = replace(residuals, course=residuals.course.risen(interval_s))
-    words = f"the {controlled} takes {interval_s:.2g} s to rise"
+    words = f"the {controlled} came one interval between readings, {interval_s:.2g} s, earlier"
+    yield Mistake("clock", f"{words} than told", response(earlier) - shown)
+    # Readings within a rise would show it.
+    rise_s = min(interval_s, first_s)
+    until = "one interval between readings" if rise_s == interval_s else "until the first reading"
+    slower = replace(residuals, course=residuals.course.risen(rise_s))
+    words = f"the {controlled} took {rise_s:.2g} s, {until}, to rise, which was not told"
     yield Mistake("rise", words, response(slower) - shown)
 
 
@@ -104,8 +109,12 @@ def find_moves(
 
 
 def as_moves(mistakes: Sequence[Mistake], labels: Sequence[str], changes: Array) -> list[Move]:
-    """Return what errors do to quantities, (n_labels, n_errors), without those that are NaN."""
-    columns = np.round(changes, _DECIMALS).T.tolist()
+    """Return what errors do to quantities, without those that are NaN.
+
+    Changes are of their logarithms, (n_labels, n_errors).
+    """
+    relative = np.expm1(np.clip(changes, -_MOST, _MOST))
+    columns = (np.round(relative, _DECIMALS) + 0.0).T.tolist()
     rows = (zip(labels, column, strict=True) for column in columns)
     return [
         Move(mistake.name, mistake.words, {label: by for label, by in row if not math.isnan(by)})

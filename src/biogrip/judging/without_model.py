@@ -222,6 +222,7 @@ def _moves(fit: AnySampleFit, quantities: Sequence["_Functional"]) -> list[Move]
 
     given = np.array([quantity.of(fit) for quantity in quantities])
     moved = (values(mistake.change) - values(-mistake.change) for mistake in mistakes)
+    # To first order, changes of logarithms.
     changes = np.array([0.5 * each / given for each in moved]).T
     return as_moves(mistakes, [quantity.name for quantity in quantities], changes)
 

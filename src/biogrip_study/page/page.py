@@ -13,6 +13,7 @@ import PIL.Image
 import yaml
 
 from biogrip import __version__
+from biogrip.command.words import error_in_words
 from biogrip.digits import legible, significant, with_unit
 from biogrip.errors import BiogripError
 from biogrip.figures.fit import scale_of
@@ -58,6 +59,7 @@ _SCREEN_DIGITS = 6
 _SLIDER_BEYOND = 10.0
 
 TEMPLATES = environment(Path(__file__).parent)
+TEMPLATES.filters["error"] = error_in_words
 TEMPLATES.globals |= {"target_of": quantity_value}
 _NUMBER_IN_CELL = re.compile(r"(?:&[gl]t;|[≤≥−])*\d[\d.]*(·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?(\u00a0%)?")
 
