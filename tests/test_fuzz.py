@@ -1,10 +1,13 @@
 """Damaged files: each command gives an answer or one message, and no traceback."""
 
 import re
+import subprocess
+import sys
 from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from biogrip.cli import main
@@ -73,6 +76,54 @@ def test_a_damaged_trace_gives_an_answer_or_one_message(
         assert said if status == 0 else f"\n{text}".count("\nbiogrip: ") == 1, seed
         assert "fault of biogrip" not in text, seed
         assert "\x1b" not in said + text, seed
+
+
+# Shapes that are small on the disk, or slow to read, times how often they are said.
+SHAPES = [
+    b",",
+    b'"',
+    b"\0",
+    b"[",
+    b"\n",
+    b"\r",
+    b"1",
+    b"-",
+    b"9e9,",
+    b"\xff\xfe",
+    b"\t\n",
+    b"(a",
+    b"#\n",
+]
+SHAPES += [b"0,0\n", b"1e-9;", b"nan,nan\n", "٣,٣\n".encode(), b"a b\n", b"=A1\n", b"1:2:3,4\n"]
+
+
+def test_a_thousand_hostile_files_have_a_row_each_in_bounded_memory_and_time(
+    tmp_path: Path, few: Path
+) -> None:
+    """At most 1 GB, some seconds a file; half are damaged, half of hostile shape."""
+    readings, rng = np.loadtxt(EXAMPLE, delimiter=",", skiprows=1)[::10], np.random.default_rng(0)
+    rows = [[f"{it:.9g}" for it in row] for row in readings]
+    names = [f"{number:04}.csv" for number in range(1000)]
+    for number, name in enumerate(names):
+        content = damaged(number, ["time_s", "rotation_rad"], rows, NUMBERS)
+        if number % 2:
+            often = int(10 ** rng.uniform(1, 5.5))
+            shape = SHAPES[number // 2 % len(SHAPES)] * often
+            place = int(rng.integers(len(content) + 1))
+            content = content[:place] + shape + content[place:]
+        (tmp_path / name).write_bytes(content)
+    (tmp_path / "sheet.tsv").write_text("\n".join(["file", *names]))
+    code = "import resource, sys; from biogrip.cli import main; main(sys.argv[1:]); "
+    code += "print(max(resource.getrusage(of).ru_maxrss for of in (0, -1)))"
+    given = ["identify", tmp_path / "sheet.tsv", "--config", few, "--csv", tmp_path / "found.csv"]
+    command = [sys.executable, "-c", code, *map(str, given)]
+    run = subprocess.run(command, capture_output=True, text=True, timeout=7200)
+    assert int(run.stdout.split()[-1]) < 1e6, "kB"
+    found = pd.read_csv(tmp_path / "found.csv")
+    assert [Path(trace).name for trace in found.iloc[:, 0]] == names
+    assert set(found["fit"]) <= {"ok", "doubtful", "rejected", "failed"}
+    assert "Traceback" not in run.stderr
+    assert "fault of biogrip" not in run.stderr + run.stdout
 
 
 WORDS = [*NUMBERS, "0", "-1", "1e-400", "0.9", "2", "1_0", "b", "a1", "<b>", "\x1b[31m", "=1+1"]

@@ -1,12 +1,15 @@
 import os
+import random
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
 
 from biogrip.files import scratch_path, write_text
+from tests.helpers.identified import FEW, write_drop
 
 BEGIN = """
 import atexit, os, sys, time
@@ -110,3 +113,45 @@ def test_it_can_be_stopped_before_it_loads_anything_large(tmp_path: Path) -> Non
     ours = {name for name in loaded if name.startswith("biogrip")}
     assert ours == {"biogrip", "biogrip.__main__", "biogrip.processes", "biogrip.terminal"}
     assert not {"argparse", "json", "typing", "hashlib", "pathlib"} & loaded
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("page", [False, True])
+def test_a_batch_that_is_killed_gives_the_same_bytes_after_the_next_call(
+    tmp_path: Path, page: bool
+) -> None:
+    """At 30 moments of the whole run, from loading to the table; nothing half-written is left."""
+    names = [f"cell_{number}.csv" for number in range(4)]
+    (tmp_path / "few.yaml").write_text(FEW)
+    for seed, name in enumerate(names):
+        write_drop(tmp_path / name, seed)
+    (tmp_path / "cells.tsv").write_text("\n".join(["file", *names]))
+    command = [sys.executable, "-m", "biogrip", "identify", "cells.tsv", "--config", "few.yaml"]
+    command += ["--model", "liquid_drop", "--csv", "found.csv", *["--report", "page.html"] * page]
+    outputs = ["found.csv", *["page.html"] * page]
+
+    def called(after_s: float | None = None) -> float:
+        begun_s = time.monotonic()
+        with open(os.devnull, "w") as quiet:
+            run = subprocess.Popen(
+                command, cwd=tmp_path, start_new_session=True, stdout=quiet, stderr=quiet
+            )
+        try:
+            assert run.wait(after_s) == 0
+        except subprocess.TimeoutExpired:
+            os.killpg(run.pid, signal.SIGKILL)
+            run.wait()
+        return time.monotonic() - begun_s
+
+    lasts_s = called()
+    whole = {output: (tmp_path / output).read_bytes() for output in outputs}
+    given = {"cells.tsv", "few.yaml", *names}
+    rng = random.Random(0)
+    for _ in range(30):
+        for left in tmp_path.iterdir():
+            if left.name not in given:
+                left.unlink()
+        called(rng.uniform(0.05, 1.0) * lasts_s)
+        called()
+        assert {output: (tmp_path / output).read_bytes() for output in outputs} == whole
+        assert not [left for left in tmp_path.iterdir() if left.name.startswith(".")]

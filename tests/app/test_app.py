@@ -18,7 +18,15 @@ from flask.testing import FlaskClient
 from playwright.sync_api import Page, expect
 
 import biogrip.app.window as window_of
-from biogrip.app.choices import CHOICES, KNOWN, likely_choices, options_typed, remedies_in
+from biogrip.app.choices import (
+    CHOICES,
+    KNOWN,
+    likely_choices,
+    options_typed,
+    remedies_by_column,
+    remedies_in,
+    with_option,
+)
 from biogrip.app.server import app_of
 from biogrip.app.window import Window
 from biogrip.cli import main
@@ -92,7 +100,7 @@ def choose(page: Page, chosen: Mapping[str, str]) -> None:
 
 def identified(page: Page, folder: Path) -> list[dict[str, str]]:
     """The table that is downloaded, after it is compared with what the shown command writes."""
-    page.click("text=Identify >> nth=-1")
+    page.click("button.main")
     link = page.locator("a.button", has_text="table.csv")
     link.wait_for(timeout=120_000)
     with page.expect_download() as download:
@@ -217,7 +225,7 @@ def test_what_is_missing_or_stopped_is_told_and_mended_in_place(
     expect(window.locator("#typed")).to_contain_text("--set measurement.time_unit=ms")
     expect(window.locator("#files")).to_contain_text("clock, in ms")
     choose(window, {"model": "generalized_maxwell_2"})
-    window.click("text=Identify >> nth=-1")
+    window.click("button.main")
     expect(window.locator("#result [role=status]")).to_contain_text(re.compile("for [2-9] s"))
     window.click("text=Stop >> nth=-1")
     expect(window.locator("#result [role=alert]")).to_contain_text("no file was left half-written")
@@ -458,3 +466,156 @@ def test_every_model_is_drawn_with_its_elements() -> None:
         dampers = sum(own.startswith("c") for own in names)
         counts = text.count("/\\/\\"), text.count("[==]"), text.count("<>")
         assert counts == (len(names) - dampers - 2 * springpots, dampers, springpots)
+
+
+def window_of_columns(folder: Path, header: str, **chosen: str) -> Window:
+    """A window with a file of these columns, of which some things are chosen."""
+    time_s = np.arange(0, 30, 0.5)
+    write_trace(folder / "a.csv", *[1 + time_s] * len(header.split(",")), header=header)
+    window = Window(folder, names=["a.csv"])
+    window.look()
+    window.chosen |= chosen
+    window.check()
+    return window
+
+
+@pytest.mark.parametrize(
+    ("header", "chosen", "typed"),
+    [
+        (
+            "time_s,length_um",
+            {"hold": "300 Pa"},
+            [{"shape": "pipette 2.5 um"}],
+        ),
+        (
+            "time_s,length_um,pressure_Pa",
+            {},
+            [{"shape": "pipette 2.5 um"}],
+        ),
+        (
+            "time_s,length_um",
+            {"reading": "strain", "hold": "300 Pa"},
+            [
+                {"shape": "cylinder 8 mm x 4 mm"},
+                {"reading": "displacement", "column": "length_um"},
+                {"shape": "pipette 2.5 um"},
+            ],
+        ),
+    ],
+)
+def test_what_has_a_unit_of_another_kind_needs_a_shape(
+    tmp_path: Path, header: str, chosen: dict[str, str], typed: list[dict[str, str]]
+) -> None:
+    """No button calls a length a pure number; by the buttons one after the other it can run."""
+    for expected in typed:
+        window = window_of_columns(tmp_path, header, **chosen)
+        (remedy,) = remedies_in(window.problem)
+        assert with_option(*remedy, "") == expected
+        chosen |= expected
+    assert window_of_columns(tmp_path, header, **chosen).problem == ""
+    forced = {"shape": "", "reading": "strain", "load": "", "hold": "300 Pa"}
+    forced |= {"more": "--set measurement.reading_unit=1"}
+    window = window_of_columns(tmp_path, header, **{**chosen, **forced})
+    assert "found the unit '1' where the name says 'um'" in window.problem
+
+
+def test_each_column_without_a_unit_has_its_own(
+    client: FlaskClient, windows: dict[str, Window]
+) -> None:
+    rows = b"time,stress\n1,2\n2,3\n3,4\n"
+    post(client, "files", files=(BytesIO(rows), "a.csv"))
+    page = post(client, "choose", hold="2 %")
+    found = remedies_by_column(windows["one"].problem)
+    assert [*found] == ["time", "stress"]
+    assert [*found["time"].values()] == ["s", "ms", "us", "min", "h", "d"]
+    assert [*found["stress"].values()][:3] == ["Pa", "kPa", "MPa"]
+    rows_shown = re.findall(r'<p class="buttons">(\w+): .*?value="--set ([\w.]+)=', page)
+    assert rows_shown == [
+        ("time", "measurement.time_unit"),
+        ("stress", "measurement.reading_unit"),
+    ]
+
+
+def test_it_asks_for_columns_first(client: FlaskClient, windows: dict[str, Window]) -> None:
+    rows = b"clock,y\ns,um\n1,2\n2,3\n3,4\n4,4\n5,5\n6,5\n"
+    asked = 'class="problem">Which column is the {}?'
+    assert asked.format("reading") in post(client, "files", files=(BytesIO(rows), "a.csv"))
+    chosen = {"reading": "displacement", "column": "y", "hold": "20 pN"}
+    assert asked.format("time") in post(client, "choose", **chosen)
+    post(client, "choose", time="clock")
+    assert windows["one"].problem == ""
+
+
+def test_a_result_of_other_choices_is_told(client: FlaskClient, windows: dict[str, Window]) -> None:
+    post(client, "example", do="a pipette")
+    assert ">Working on it …</span>" in post(client, "start")
+    changed = post(client, "choose", hold="300 Pa")
+    assert ">Settings changed: identify again.</span>" in changed
+    assert "--hold &#39;400 Pa&#39;" in changed.partition("This is the result of: ")[2][:200]
+    assert ' class="stale"' in changed
+    assert ' class="stale"' not in post(client, "choose", hold="400 Pa")
+    work = windows["one"].work
+    assert work
+    post(client, "stop")
+    assert ">Ended early: see the result.</span>" in post(client, "show")
+    file = BytesIO((DATA / "pipette.csv").read_bytes()), "pipette.csv"
+    assert "the result of: files before these" in post(client, "files", files=file)
+
+
+def test_the_picture_follows_the_reading_and_says_units(
+    client: FlaskClient, windows: dict[str, Window]
+) -> None:
+    rows = "time;length;force\nmin;um;nN\n" + "".join(f"{n};{n + 1};{2 * n}\n" for n in range(9))
+    page = post(client, "files", files=(BytesIO(rows.encode()), "a.csv"))
+    chosen = windows["one"].chosen
+    assert (chosen["across"], chosen["upward"]) == ("time", "length")
+    assert windows["one"].units == {"time": "min", "length": "um", "force": "nN"}
+    assert "Use nothing after (s)" in page
+    assert "range of times, in s; the picture is in min." in page
+    post(client, "choose", across="length")
+    assert (chosen["across"], chosen["upward"]) == ("length", "length")
+    post(client, "choose", reading="force", column="force", load="length")
+    chosen = windows["one"].chosen
+    assert (chosen["across"], chosen["upward"]) == ("time", "force")
+    assert "Use nothing below (Hz)" in post(client, "example", do="a frequency sweep")
+
+
+def test_what_was_held_has_its_name_and_example(client: FlaskClient) -> None:
+    page = post(client, "example", do="a pipette")
+    assert "What was held (pressure), with its unit" in page
+    assert 'placeholder="300 Pa"' in page
+    assert "What was held (force), with its unit" in post(client, "choose", shape="")
+    page = post(client, "choose", reading="stress", hold="2")
+    assert "What was held (strain), with its unit" in page
+    assert 'placeholder="2 %"' in page
+    assert "A strain of 2 is 200 %." in page
+    for hold in ("2 %", "0.02"):
+        assert "A strain of" not in post(client, "choose", hold=hold)
+
+
+def test_a_phone_shows_numbers_whole_what_is_copied_and_the_result(
+    visit: Callable[..., Opened], address: str, tmp_path: Path
+) -> None:
+    page = visit(address, viewport=PHONE, permissions=["clipboard-write", "clipboard-read"]).page
+    time_s = np.arange(0.5, 30, 0.5)
+    strain = -1.2345e-7 * (1 - 0.5 * np.exp(-time_s / 5))
+    write_trace(tmp_path / "a.csv", time_s, strain, header="time_s,strain")
+    page.set_input_files("#upload", tmp_path / "a.csv")
+    page.fill("#hold", "300 Pa")
+    page.press("#hold", "Tab")
+    expect(page.locator("#typed")).to_contain_text("300 Pa")
+    inside = "all => all.map(text => text.getBBox().x)"
+    numbers = page.locator("#picture text", has_text="e-")
+    expect(numbers).to_have_count(2)
+    # The name of the axis stands left of them, within 40 of 660.
+    assert min(numbers.evaluate_all(inside)) > 30
+    page.click("#copy")
+    expect(page.locator("#copied")).to_have_text("Copied.")
+    assert page.evaluate("navigator.clipboard.readText()") == page.inner_text("#typed")
+    page.click("button.main")
+    expect(page.locator("#state")).to_have_text(re.compile("Working|Done"))
+    expect(page.locator("#h-result")).to_be_in_viewport()
+    page.fill("#hold", "200 Pa")
+    page.press("#hold", "Tab")
+    expect(page.locator("#state")).to_have_text("Settings changed: identify again.")
+    expect(page.locator("#result.stale .problem")).to_contain_text("--hold '300 Pa'")

@@ -70,7 +70,7 @@ def test_evaluations_are_counted(method: str, monkeypatch: pytest.MonkeyPatch) -
         return of_many(residuals, x, slopes=slopes)
 
     of_one, of_many = Residuals.__call__, Residuals.condensed_responses
-    monkeypatch.setattr(misfit, "_series_of", lambda residuals: None)
+    monkeypatch.setattr(misfit, "series_of", lambda residuals: None)
     monkeypatch.setattr(Residuals, "__call__", at_one)
     monkeypatch.setattr(Residuals, "condensed_responses", at_many)
     assert run(method, posed).evaluations == counted[0]

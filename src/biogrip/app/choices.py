@@ -11,7 +11,7 @@ import yaml
 from biogrip.arrays import Array
 from biogrip.command.options import GROUPS
 from biogrip.errors import BiogripError
-from biogrip.physics.instruments import INSTRUMENTS, PARTNERS, ROTATION
+from biogrip.physics.instruments import DISPLACEMENT, INSTRUMENTS, PARTNERS, ROTATION, STRESS
 from biogrip.traces.columns import AXES, plain_name
 
 KNOWN = yaml.safe_load(Path(__file__).with_name("known.yaml").read_text("utf-8"))
@@ -49,6 +49,9 @@ def likely_choices(numbers: Mapping[str, Array]) -> dict[str, str]:
     reading, load = instrument.read.name, instrument.controlled.name * (not instrument.relative)
     if {load, reading} <= {*columns}:
         load, reading = sorted((load, reading), key=lambda name: _steps(numbers[columns[name]]))
+    elif reading == DISPLACEMENT.name and STRESS.name in columns:
+        # A pipette sucks.
+        load = STRESS.name
     partner = next((name for name in PARTNERS if name in columns), "")
     chosen = {"column": reading, "load": load, "partner_column": partner}
     chosen |= {axis: axis for axis in AXES}
@@ -89,8 +92,17 @@ def with_option(option: str, value: str, more: str) -> dict[str, str]:
     return {"more": f"{more} {shlex.join(filter(None, (option, value)))}".strip()}
 
 
+def remedies_by_column(message: str) -> dict[str, dict[tuple[str, str], str]]:
+    """Return remedies of a message's lines by the column that they are about, or by nothing."""
+    remedies: dict[str, dict[tuple[str, str], str]] = {}
+    for line in message.split("\n"):
+        column = line.partition(", column '")[2].partition("': ")[0]
+        remedies[column] = remedies.get(column, {}) | remedies_in(line)
+    return remedies
+
+
 def remedies_in(message: str) -> dict[tuple[str, str], str]:
-    """Return options and values that a message names, with what their buttons say.
+    """Return options and values that a line names, with what their buttons say.
 
     Where it asks for a unit, there is one for each that is allowed.
     """

@@ -13,7 +13,7 @@ from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory, mkdtemp
 
-from biogrip.app.choices import CHOICES, KNOWN, TICKED, remedies_in, with_option
+from biogrip.app.choices import CHOICES, KNOWN, TICKED, remedies_by_column, with_option
 from biogrip.app.window import LARGEST_MB, LONGEST_S, Window
 from biogrip.errors import BiogripError
 from biogrip.page.templates import environment
@@ -37,7 +37,7 @@ _HEADERS = {"Content-Security-Policy": _POLICY, "X-Content-Type-Options": "nosni
 _SHOWN = {
     **{"known": KNOWN, "instruments": INSTRUMENTS, "limits": (LARGEST_MB, LONGEST_S // 60)},
     **{"candidates": CANDIDATES, "shapes": KNOWN_SHAPES, "units": TIME_UNITS, "outputs": _OUTPUTS},
-    **{"remedies_in": remedies_in, "form_in_words": form_in_words},
+    **{"remedies_by_column": remedies_by_column, "form_in_words": form_in_words},
 }
 
 
@@ -114,6 +114,7 @@ def app_of(windows: dict[str, Window], token: str) -> Flask:
 def _do(action: str, window: Window) -> None:
     """Take what is chosen, and do one thing more."""
     given, do = request.form, request.form.get("do", "")
+    drawn = [window.chosen[name] for name in (window.axis, "column")]
     window.chosen |= {key: given.get(key, "") for key in CHOICES if key in (*given, *TICKED)}
     if action == "files":
         for file in request.files.getlist("files"):
@@ -128,5 +129,8 @@ def _do(action: str, window: Window) -> None:
         window.chosen |= with_option(option, value, window.chosen["more"])
     if action != "show" and window.names:
         window.check()
+    # The picture follows what is read.
+    if (now := [window.chosen[name] for name in (window.axis, "column")]) != drawn:
+        window.chosen |= {"across": now[0], "upward": now[1]}
     if action in ("stop", "compare") or (action == "start" and window.traces):
         getattr(window, action)()

@@ -21,6 +21,8 @@ async function answered(action, more) {
   if (!answer.ok) return fail(`${page.title}: ${page.querySelector("p")?.textContent}`);
   fail("");
   show(page, new Map(new FormData(form)), sent);
+  const next = document.querySelector("#command .problem") ? "command" : "result";
+  if (action === "start") document.getElementById(next).scrollIntoView();
 }
 
 function fail(text) {
@@ -43,6 +45,8 @@ function show(page, typed, sent) {
       else input.value = value;
     }
   }
+  const [state, now] = [document, page].map((any) => any.getElementById("state"));
+  if (state.textContent !== now.textContent) state.textContent = now.textContent;
   if (focused && document.activeElement.id !== focused) document.getElementById(focused)?.focus();
   draw();
   wait();
@@ -60,8 +64,12 @@ form.addEventListener("change", ({ target }) => {
   target.value = "";
 });
 form.addEventListener("click", ({ target }) => {
-  if (target.id === "copy") navigator.clipboard.writeText(document.getElementById("typed").textContent);
+  if (target.id === "copy")
+    navigator.clipboard.writeText(document.getElementById("typed").textContent)
+      .then(() => { document.getElementById("copied").textContent = "Copied."; }, (error) => fail(String(error)));
   else if (target.dataset.do) send(target.dataset.do, { do: target.value });
+  // Its sizes are an example.
+  if (target.value?.startsWith("--shape")) document.getElementById("shape")?.focus();
 });
 const upload = (files) => send("files", { files: [...files] });
 document.addEventListener("dragover", (event) => {
@@ -76,7 +84,7 @@ document.addEventListener("drop", (event) => {
 });
 
 // The picture: points of a column over another, and the range that is used.
-const [left, right, top_, bottom] = [90, 650, 10, 300];
+const [left, right, top_, bottom] = [150, 650, 10, 300];
 
 function draw() {
   const svg = document.querySelector("#picture svg");
@@ -107,10 +115,16 @@ function draw() {
   const x = scale(pairs.map((pair) => pair[0]), left, right);
   const y = scale(pairs.map((pair) => pair[1]), bottom, top_);
   add("path", { d: pairs.map(([a, b]) => `M${x.at(a).toFixed(1)},${y.at(b).toFixed(1)}h0`).join("") });
-  const short = (value) => +value.toPrecision(4);
+  const short = (value) => +value.toPrecision(3);
+  const units = JSON.parse(svg.dataset.units);
+  const named = (name) => {
+    const stated = [..."_ ([{/"].some((mark) => name.replace(/[µμ]/g, "u").includes(mark + units[name]));
+    return units[name] && !stated ? `${name}, in ${units[name]}` : name;
+  };
+  add("text", { transform: `translate(24 ${(top_ + bottom) / 2}) rotate(-90)`, "text-anchor": "middle" }, named(upward));
   add("text", { x: left, y: bottom + 20 }, short(x.low));
   add("text", { x: right, y: bottom + 20, "text-anchor": "end" }, short(x.high));
-  add("text", { x: (left + right) / 2, y: bottom + 36, "text-anchor": "middle" }, across);
+  add("text", { x: (left + right) / 2, y: bottom + 36, "text-anchor": "middle" }, named(across));
   add("text", { x: left - 6, y: bottom, "text-anchor": "end" }, short(y.low));
   add("text", { x: left - 6, y: top_ + 10, "text-anchor": "end" }, short(y.high));
   if (across !== svg.dataset.axis) return;

@@ -21,6 +21,7 @@ from biogrip.command.settings import Asked, check_settings, read_trace
 from biogrip.command.sheet import is_table
 from biogrip.command.words import limits_in_short
 from biogrip.errors import BiogripError
+from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.traces.reader import Recording
 from biogrip.traces.tables import Sheet, Table, numbers_in, overview
 
@@ -64,6 +65,8 @@ class Window:
     """The command, while it runs and when it has ended."""
     out: Path = Path()
     started: float = 0.0
+    ran: str = ""
+    """What had been typed for it; nothing if a file has come since."""
     compared: str = ""
     """What the comparison of groups says."""
 
@@ -75,6 +78,7 @@ class Window:
         else:
             self.names = [*dict.fromkeys([*self.names, plain])]
         (self.folder / plain).write_bytes(content.read())
+        self.ran = ""
 
     @property
     def inputs(self) -> list[str]:
@@ -85,6 +89,19 @@ class Window:
     def typed(self) -> list[str]:
         """The command as it is typed, but for what it writes."""
         return ["identify", *self.inputs, *options_typed(self.chosen), *self.config]
+
+    @property
+    def axis(self) -> str:
+        """What readings follow: time or frequency."""
+        return "frequency" if INSTRUMENTS[self.chosen["reading"] or "rotation"].sweeps else "time"
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Units of columns that have one, as they are read or stand below the names."""
+        below = zip(self.table.names, self.table.units or (), strict=False) if self.table else ()
+        read = self.recording.form["columns"].values() if self.recording else ()
+        units = dict(below) | {it["column"]: it["unit"] for it in read}
+        return {name: unit.strip("[]() ") for name, unit in units.items() if unit not in ("1", "-")}
 
     def look(self) -> None:
         """Read the first trace; if it has not what is chosen, choose what names of columns tell."""
@@ -113,7 +130,14 @@ class Window:
             check_settings(there[:_CHECKED])
             self.recording = read_trace(there[0])[0] if there else None
         except BiogripError as error:
-            self.problem = self.shown(error)
+            self.problem = self._missing() or self.shown(error)
+
+    def _missing(self) -> str:
+        """Ask for the column of readings, or of what they follow, before anything else."""
+        given = self.config or self.chosen["more"] or self.names != self.inputs
+        asked = {} if given or not self.table else {"column": "reading", self.axis: self.axis}
+        missing = [what for name, what in asked.items() if not self.chosen[name]]
+        return f"Which column is the {missing[0]}? Choose it under 2." if missing else ""
 
     def _traces(self) -> list[Asked]:
         """Return what is asked; a `BiogripError` says what the window does not do."""
@@ -146,7 +170,7 @@ class Window:
     def start(self) -> None:
         """Start the command in a process of its own, in place of what ran before."""
         self.stop()
-        self.started, self.compared = time.time(), ""
+        self.started, self.compared, self.ran = time.time(), "", self.command
         self.out = self.folder.with_name(f"{self.folder.name} {time.monotonic_ns()}")
         self.out.mkdir()
         names = {"--report": "page.html", "--csv": "table.csv", "--output": "result.json"}

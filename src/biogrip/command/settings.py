@@ -11,6 +11,7 @@ modulus is read, a hold of 1 needs no option.
 
 import os
 import re
+import shlex
 import sys
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
@@ -28,15 +29,7 @@ from biogrip.config.case import SampleCase
 from biogrip.config.experiment_blocks import LARGEST_PARAMETER, LONGEST_S, SHORTEST_S
 from biogrip.config.loading import load, read_config_of, read_configs, trace_defaults
 from biogrip.config.messages import checked, with_numbers
-from biogrip.config.source import (
-    HOLD,
-    RAMP,
-    KeyPath,
-    Source,
-    keys_in,
-    overlaid,
-    read_source,
-)
+from biogrip.config.source import HOLD, RAMP, KeyPath, Source, keys_in, overlaid, read_source
 from biogrip.config.trace_blocks import TraceConfig
 from biogrip.errors import BiogripError
 from biogrip.physics.instruments import (
@@ -51,10 +44,7 @@ from biogrip.physics.instruments import (
 )
 from biogrip.physics.models import ALIASES, CANDIDATES
 from biogrip.physics.shapes import KNOWN_SHAPES
-from biogrip.traces.columns import (
-    held_unit,
-    place,
-)
+from biogrip.traces.columns import held_unit, place
 from biogrip.traces.measurement_block import ARRAYS, READINGS, ByOptions, MeasurementBlock
 from biogrip.traces.reader import Recording, read_recording, recording_of_arrays
 
@@ -135,10 +125,10 @@ class Asked:
             blocks = _laid_over(blocks, setting)
         counts_as = _by_shape(measured := measured_keys(blocks))
         for name in {*measured} & ({*counts_as.values()} - {*counts_as}):
+            read = f"{[*counts_as][name == STRAIN.name]}={measured[name]}"
             raise BiogripError(
                 f"{self.place}: found a shape and a reading of {name}; allowed are "
-                f"{' and '.join(counts_as)}, as by --reading {[*counts_as][name == STRAIN.name]}="
-                "COLUMN."
+                f"{' and '.join(counts_as)}, as by --reading {shlex.quote(read)}."
             )
         renamed = {counts_as.get(key, key): value for key, value in measured.items()}
         return {**blocks, "measurement": renamed} if counts_as else blocks

@@ -26,6 +26,8 @@ from biogrip.judging.likelihood import Likelihood, find_thresholds
 from biogrip.judging.without_model import KINDS, WithoutModel, tell_without_model
 from biogrip.physics.protocol import largest_load
 
+# Least noise over the largest reading: traces without any are rounded.
+_ROUNDING = 1e-9
 # What a stiffness does, and what two explanations of that leave open.
 _WAYS = {1: "rises", -1: "falls"}
 _NOT_TOLD = ": repeat the first trace at the end to tell which"
@@ -139,6 +141,8 @@ def _with_start(diagnosis: Diagnosis) -> Likelihood:
     they follow in part from what the trace tells of the sample.
     """
     likelihood, ends_s = diagnosis.likelihood, diagnosis.onset_limits_s
+    least = _ROUNDING * likelihood.problem.residuals.peak
+    likelihood = replace(likelihood, noise_sd=max(likelihood.noise_sd, least))
     if ends_s is None:
         return likelihood
     given = likelihood.problem, likelihood.best, (ends_s[1] - ends_s[0]) / 2

@@ -125,7 +125,8 @@ def shared_freedom(best: Array, singles: Sequence[Likelihood]) -> float:
 
 def _common(singles: Sequence[Likelihood], weights: Array) -> float:
     """Return degrees of freedom of a mean of the traces' variances, by weights, (n_traces,)."""
-    shares, freedoms = weights / weights.sum(), np.array([single.freedom for single in singles])
+    shares = weights / max(float(weights.sum()), float(np.finfo(float).tiny))
+    freedoms = np.array([single.freedom for single in singles])
     return 1 / max(float(np.sum(shares**2 / freedoms)), 1 / _MOST_FREEDOM)
 
 

@@ -15,11 +15,13 @@ from unicodedata import normalize
 from biogrip.errors import BiogripError, nearest
 from biogrip.physics.instruments import (
     DISPLACEMENT,
+    FORCE,
     INSTRUMENTS,
     MODULUS,
     PHASE,
     ROTATION,
     STRAIN,
+    STRESS,
     Channel,
 )
 from biogrip.physics.shapes import KNOWN_SHAPES, Shape
@@ -79,22 +81,13 @@ _RATIO = re.compile(r"[^\W\d_]+\d*\s*/\s*([^\W_]+)")
 # 1/s in a column of this name is rad/s; in another it may as well be Hz.
 _ANGULAR = re.compile("ang|omega|ω|kreis", re.I)
 _READING_UNITS = {unit for instrument in INSTRUMENTS.values() for unit in instrument.read.units}
-_UNITS = {
-    *TIME_UNITS,
-    "V",
-    "mV",
-    "uV",
-    "A",
-    "mA",
-    "px",
-    "pixel",
-    "pixels",
-    "counts",
-    *_READING_UNITS,
-}
+_ELECTRICAL, _COUNTED = {"V", "mV", "uV", "A", "mA"}, {"px", "pixel", "pixels", "counts"}
+_UNITS = {*TIME_UNITS, *_ELECTRICAL, *_COUNTED, *_READING_UNITS}
 _NUMBERED = re.compile(r"[ _]?(\d+|\(\d*\)|\[\d*\])$")
 # A number with what may be its unit behind it.
 _SIZED = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s*(.*?)\s*", re.I)
+_SUCKS = " A pressure sucks into a pipette, as by --shape 'pipette 2.5 um', with your own radius."
+_TO_STRAIN = " A length is a strain by a scale or shape, as by --shape 'cylinder 8 mm x 4 mm'."
 _MOST_LISTED = 50
 _LONGEST_SHOWN = 40
 _LONGEST_PATH = 200
@@ -124,27 +117,32 @@ def unit_of(
     unit = (at_end or in_row) if given is None else known_unit(given, allowed)
     if given is not None and unit is None:
         raise BiogripError(f"{where}: found the unit '{given}', allowed are {choices}.")
+    end = _said_at_end(column) or ""
+    # That of an axis may be shortened, as time_m.
+    known = _READING_UNITS - {"1"} if allowed not in AXES.values() else ()
+    kind = known_unit(end or _bare(below), known)
     in_row = in_row or (known_unit(_bare(below), _READING_UNITS) if given and not scaled else None)
+    at_end = at_end or (kind if end and given and not scaled else None)
     of_frequency = unit == "1/s" and "Hz" in allowed
     if of_frequency and not _ANGULAR.search(plain_name(column)):
         raise BiogripError(f"{where}: found the unit 1/s; allowed are rad/s or Hz, by {said_by}.")
     if unit is None and "1" in allowed and _bare(below) in ("", "-") and _is_pure(column):
         return "1"
     if unit is None:
-        end = _said_at_end(column)
         found = f"the unit '{shortened(end)}' at the end of the name" if end else "no unit"
         row = f" (but '{shortened(below)}' below it)" if below else ""
-        how = f", or state one by {said_by}"
-        if not end:
-            row, how = f"{row}, neither stated (by {said_by}) nor at the end of the name", ""
+        how = f", or state one by {said_by}" if end and not kind else ""
+        row += f", neither stated (by {said_by}) nor at the end of the name" * (not (end or kind))
         of_moduli = not end and allowed == MODULUS.units
         hint = " What is over another modulus, as G/G0, is a relative_modulus." * of_moduli
         if allowed == ROTATION.units:
             names = (name for name in INSTRUMENTS if name in plain_name(column).lower())
             example = f"{next(names, STRAIN.name)}={column}"
             hint = f" Which quantity is it? Say so, as by --reading {quote(example)}."
-        elif allowed == STRAIN.units and known_unit(end or _bare(below), DISPLACEMENT.units):
-            hint = " A length is a strain by the sample's shape, see --shape, or by a scale."
+        elif allowed == STRAIN.units and kind in DISPLACEMENT.units:
+            hint = _TO_STRAIN
+        elif allowed.keys() == FORCE.units.keys() and kind in STRESS.units:
+            hint = _SUCKS
         raise BiogripError(f"{where}: found {found}{row}; allowed are {choices}{how}.{hint}")
     for other, said in ((at_end, "the name"), (in_row, "the row of units")):
         if other not in (None, unit):
@@ -234,10 +232,10 @@ def held_unit(value: float | str, controlled: Channel, by: str = "--hold") -> tu
         allowed = ", ".join(controlled.units)
         found = f"found the unit '{shortened(written)}' of a {controlled.title}"
         found = found if written else "found no unit"
-        others = [
-            name for name, it in INSTRUMENTS.items() if known_unit(written, it.controlled.units)
-        ]
+        others = [n for n, it in INSTRUMENTS.items() if known_unit(written, it.controlled.units)]
         other = f" Or say what is read, as by --reading {others[0]}=COLUMN." if others else ""
+        if controlled.title == FORCE.name and known_unit(written, STRESS.units):
+            other = _SUCKS
         raise BiogripError(f"{by}: {found}, allowed are {allowed}.{other}")
     return number, unit
 
