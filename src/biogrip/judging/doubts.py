@@ -216,8 +216,8 @@ def _find_notes(left: _Left, misfit: Note | None = None) -> list[Note]:
         doubts += left.lines or changes[-1:] if misfit else left.lines or changes or colour
     notes += (Note(DOUBT, doubt) for doubt in doubts)
     if notes and in_time and not residuals.coloured and compute_status(notes) == DOUBTFUL:
-        text = "measurement.noise_model: coloured, or --noise-model coloured, gives intervals that"
-        notes.append(Note(HARMLESS, f"If the set-up is right, {text} allow for such noise."))
+        how = "If the set-up is right, measurement.noise_model: coloured, or --noise-model coloured"
+        notes.append(Note(HARMLESS, f"{how}, gives intervals that allow for such noise."))
     return notes
 
 
