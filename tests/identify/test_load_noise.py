@@ -18,6 +18,7 @@ TIMES: Array = np.arange(300.0) * 0.2
 SINE: Array = 5 * np.sin(2 * np.pi * TIMES / 5)
 
 
+@pytest.mark.nightly
 def test_what_a_smoothed_sine_is_off_by_is_what_is_said() -> None:
     """Chi^2 of 20 records over its mean: its standard deviation is 0.05 with some 50 each."""
     rng, ratios, shares = np.random.default_rng(0), [], []
@@ -56,6 +57,7 @@ def test_a_stretch_that_does_not_move_is_held_at_its_mean() -> None:
     np.testing.assert_allclose(np.linalg.norm(errors, axis=0)[[0, -1]], expected, rtol=0.3)
 
 
+@pytest.mark.nightly
 def test_a_few_rows_between_steps_are_held_as_the_noise_of_all_rows_tells() -> None:
     """Chi^2 of six rows' mean over 200 records; what rises by far more than noise stays."""
     rng, ratios = np.random.default_rng(5), []
