@@ -12,7 +12,7 @@ from tests.helpers.places import ROOT
 # Its tables and their text are written by benchmarks.levels.
 WRITTEN = ROOT / "docs" / "levels.md"
 # Their commands take longest.
-SLOW = ("tutorial.md", "relaxation.md", "creep.md", "groups.md", "modulus.md")
+SLOW = ("README.md", "tutorial.md", "relaxation.md", "creep.md", "groups.md", "modulus.md")
 NOT_PROSE = re.compile(
     r"<!-- (\w+): begin.*?<!-- \1: end -->|<!--.*?-->|^ *```.*?^ *```$|^    [^\n]*$", re.S | re.M
 )

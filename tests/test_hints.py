@@ -182,7 +182,11 @@ ADVICE = {
 }
 
 
-@pytest.mark.parametrize("make", ADVICE, ids=lambda make: make.__name__)
+@pytest.mark.parametrize(
+    "make",
+    [pytest.param(it, marks=[pytest.mark.nightly] * (it is not rise)) for it in ADVICE],
+    ids=lambda make: make.__name__,
+)
 def test_advice_beside_a_result_helps(tmp_path: Path, make: object) -> None:
     """It is typed, the truth is within 5 %, and it is not given again."""
     pattern, name, true = ADVICE[make]  # type: ignore[index]

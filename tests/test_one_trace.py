@@ -62,6 +62,7 @@ def test_the_example_gives_its_truth() -> None:
     assert not [name for name in header if "rad/s" in name]
 
 
+@pytest.mark.nightly
 def test_models_are_spared_that_cannot_suit_the_trace_better(tmp_path: Path) -> None:
     """Named in the config, all are fitted: those that were spared change nothing that is said."""
     few = "least_squares: {candidates: 100, starts: 4}"
@@ -392,6 +393,7 @@ def test_noise_is_named_by_who_says_what_it_is() -> None:
         assert noise_in_words(found) == said
 
 
+@pytest.mark.nightly
 def test_a_picture_of_one_trace_is_written(tmp_path: Path, few: Path) -> None:
     trace, other = tmp_path / "a.csv", tmp_path / "b.csv"
     for seed, path in enumerate((trace, other)):

@@ -176,6 +176,7 @@ def test_readings_are_planned_whose_spacing_grows_by_a_power_of_time_near_one() 
     assert is_cut_off(np.arange(10.1, 30.1))
 
 
+@pytest.mark.nightly
 def test_a_late_start_is_advised_with_its_limits_and_its_rows_tell_the_zero() -> None:
     """A ramp from 8.4 to 8.7 s, and a preload: a start without the offset would be biased."""
     times = np.arange(0, 60, 0.5)

@@ -182,6 +182,7 @@ def test_noise_that_grows_over_decades_is_weighed_and_its_share_advised() -> Non
     assert np.all((limits["low"] < [1.0, 5.0]) & (limits["high"] > [1.0, 5.0]))
 
 
+@pytest.mark.nightly
 def test_limits_of_quiet_traces_allow_for_a_wrong_model() -> None:
     """A second branch of 6 % of the first, six times as slow; noise of 0.05 % of the peak."""
     times = np.linspace(0.1, 60, 600)
@@ -242,6 +243,7 @@ def test_rounding_rejects_no_trace_that_has_long_come_to_rest() -> None:
     assert np.all((limits["low"].fillna(0.0) < truth) & (limits["high"].fillna(np.inf) > truth))
 
 
+@pytest.mark.nightly
 def test_of_mucus_the_misfit_comes_before_the_reading_that_does_not_fit() -> None:
     time_s, compliance = np.loadtxt(
         ROOT / "data" / "measured" / "mucus.csv", delimiter=",", skiprows=1
