@@ -251,7 +251,7 @@ def test_text_that_is_no_value_of_an_option_is_refused() -> None:
 def test_nobody_reading_progress_is_no_error(tmp_path: Path, few: Path) -> None:
     reader, writer = os.pipe()
     os.close(reader)
-    code = "import sys; from biogrip import cli, terminal; terminal._EVERY_S = 0.0; "
+    code = "import sys; from biogrip import cli, terminal; terminal._PROGRESS_INTERVAL_S = 0.0; "
     code += "sys.exit(cli.main(sys.argv[1:]))"
     command: list[str | Path] = [sys.executable, "-c", code]
     command += ["identify", EXAMPLE, "--config", few, "--output", tmp_path / "f.json"]
