@@ -546,7 +546,7 @@ def test_of_one_unit_a_group_nothing_is_told_but_means(said: Said) -> None:
         "in both."
     )
     paper = said(rows, "--unit", "day", part=1)
-    assert "Ratios" not in paper
+    assert "Logarithms of means" not in paper
 
 
 def test_a_dish_of_one_cell_counts_as_another(said: Said) -> None:
@@ -655,7 +655,7 @@ def test_the_methods_say_what_was_compared_with_its_numbers(said: Said) -> None:
         "the noise). Groups are those of dish: left 14 cells in 3 units; right 20 cells in 4 units."
     )
     assert "The unit is the day" in text
-    assert "Ratios are compared by Welch's t test." in text
+    assert "Logarithms of means are compared by Welch's t test; p is not adjusted" in text
     assert "LaTeX" not in text
     about = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     who = f"{about['authors'][0]['name']}, {about['title']}: how well a MEMS"

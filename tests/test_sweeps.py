@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
 from biogrip.arrays import Array
 from biogrip.cli import _parser
@@ -24,6 +25,7 @@ from biogrip.physics.protocol import joined
 from tests.helpers.default import seen
 from tests.helpers.identified import by_quantity, identified, identify, told, write_trace
 from tests.helpers.laplace import IMPEDANCES
+from tests.helpers.places import ROOT
 
 OMEGA: Array = np.geomspace(0.1, 100.0, 25)
 SOLID = {"k": 3000.0, "k_p": 500.0, "c": 2000.0}
@@ -350,3 +352,14 @@ def test_inertia_is_said_as_a_share_of_the_highest_storage_modulus() -> None:
     assert ", 5 % at" in find_inertia(*given)[1]
     (said,) = about_moduli(*given, np.ones(6))
     assert said.startswith("The fit leaves what is of inertia of the instrument or the sample, as")
+
+
+def test_what_was_assumed_is_a_config_that_repeats_it(tmp_path: Path) -> None:
+    """With its model, which no option says again."""
+    sweep = ROOT / "data" / "sweep.csv"
+    columns = ["--frequency", "frequency (Hz)", "--reading", "storage=G' (Pa)"]
+    columns += ["--reading", "loss=G'' (Pa)", "--model", "springpot_beside_damper", "--no-compare"]
+    first = identified(tmp_path, sweep, *columns, config="")
+    again = identified(tmp_path, sweep, config=yaml.safe_dump(first["assumed"]))
+    assert again["assumed"]["sample"]["model"] == "springpot_beside_damper"
+    assert again["quantities"] == first["quantities"]

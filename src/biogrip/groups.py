@@ -405,7 +405,8 @@ def _tests(
     tests = {bool(row["pairs"]) for row in rows if "p" in row}
     named = "Welch's t test", f"the paired t test of each {grouped.unit} that is in both groups"
     if tests:
-        yield f"Ratios are compared by {' or '.join(named[it] for it in sorted(tests))}."
+        by = " or ".join(named[it] for it in sorted(tests))
+        yield f"Logarithms of means are compared by {by}; p is not adjusted for several quantities."
     if grouped.names[2:]:
         yield f"Groups are compared with {grouped.names[0]}, p values adjusted after Holm (1979)."
 

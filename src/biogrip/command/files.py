@@ -404,7 +404,7 @@ def sample_of(
 
 
 def _assumed(found: Experiment, case: SampleCase, tried: Sequence[str]) -> dict[str, Any]:
-    """Return what an identification relies on: its model, and a config that repeats it."""
+    """Return what an identification relies on, as a config that repeats it."""
     asked = case.block.identifiability
     blocks = ["instrument", "protocol", "search_range", "measurement", "least_squares"]
     blocks += ["gripper"] if case.instrument.has_jaws else []
@@ -418,7 +418,7 @@ def _assumed(found: Experiment, case: SampleCase, tried: Sequence[str]) -> dict[
         measurement=replace(case.block.measurement, **left_out),
     )
     return {
-        "model": case.sample.candidate,
+        "sample": {"model": case.sample.name, "branches": case.sample.branches},
         **{name: plain(getattr(block, name)) for name in blocks},
         **({"actuator": plain(case.common.actuator)} if case.instrument.has_jaws else {}),
         "fixed": case.block.fixed,

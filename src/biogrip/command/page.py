@@ -36,7 +36,7 @@ from biogrip.judging.doubts import DOUBTFUL, OK, REJECTED
 from biogrip.judging.without_model import LEVEL, level_turned
 from biogrip.page.templates import data_url, environment
 from biogrip.physics.drawing import sketched
-from biogrip.physics.models import CANDIDATES
+from biogrip.physics.models import Sample
 from biogrip.physics.protocol import evaluate, hold, join_phases, largest_load
 from biogrip.physics.simulation import simulated_response
 from biogrip.terminal import visible_lines
@@ -233,7 +233,7 @@ def write_page(outcome: Outcome, page: Path) -> None:
                 status: sum(data["fit"] == status for data in traces) for status in _STATUS_MARKS
             },
             words=words,
-            drawing_of=lambda name: sketched(CANDIDATES[name].model),
+            drawing_of=lambda sample: sketched(Sample(*sample.values()).model),
             written_by=f"{WRITTEN_BY} {__version__}",
         )
     )

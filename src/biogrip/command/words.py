@@ -196,8 +196,10 @@ def fitted_in_words(found: Mapping[str, Any]) -> list[str]:
 
 
 def given_in_words(found: Mapping[str, Any]) -> list[str]:
-    """Return a line on what was held or loaded, and one on fixed parameters, as far as given."""
+    """Return lines on what was held or loaded, a shape, and fixed parameters, as far as given."""
     lines = [visible(found["load"])] if "load" in found else []
+    if shape := found["assumed"]["measurement"].get("shape"):
+        lines.append(f"Moduli, and G, K and J, are Young's, by the shape: {visible(shape)}.")
     return [*lines, f"Fixed: {', '.join(found['fixed'])}."] if "fixed" in found else lines
 
 
