@@ -20,14 +20,13 @@ from playwright.sync_api import Page, expect
 import biogrip.app.window as window_of
 from biogrip.app.choices import (
     CHOICES,
-    KNOWN,
     likely_choices,
     options_typed,
     remedies_by_column,
     remedies_in,
     with_option,
 )
-from biogrip.app.server import app_of
+from biogrip.app.server import _SHOWN, app_of
 from biogrip.app.window import Window
 from biogrip.cli import main
 from biogrip.physics.models import CANDIDATES, MODELS
@@ -457,10 +456,9 @@ def test_a_file_is_shown_before_its_columns_are_said(
 
 
 def test_every_model_is_drawn_with_its_elements() -> None:
-    drawings = KNOWN["drawings"]
-    assert {*MODELS} <= {*drawings} <= {*CANDIDATES}
-    for name, groups in drawings.items():
-        text = "".join(branch for group in groups for branch in group)
+    assert {*MODELS} <= {*_SHOWN["models"]} <= {*CANDIDATES}
+    for name in _SHOWN["models"]:
+        text = _SHOWN["sketched"](CANDIDATES[name].model)
         names = [own.name for own in CANDIDATES[name].model.parameters]
         springpots = sum(own in ("alpha", "beta") for own in names)
         dampers = sum(own.startswith("c") for own in names)

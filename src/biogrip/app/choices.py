@@ -15,7 +15,7 @@ from biogrip.physics.instruments import DISPLACEMENT, INSTRUMENTS, PARTNERS, ROT
 from biogrip.traces.columns import AXES, plain_name
 
 KNOWN = yaml.safe_load(Path(__file__).with_name("known.yaml").read_text("utf-8"))
-"""Words of columns, examples and drawings."""
+"""Words of columns, and examples."""
 
 TICKED = "offset", "contact", "no-compare"
 CHOICES = (

@@ -17,8 +17,9 @@ from biogrip.app.choices import CHOICES, KNOWN, TICKED, remedies_by_column, with
 from biogrip.app.window import LARGEST_MB, LONGEST_S, Window
 from biogrip.errors import BiogripError
 from biogrip.page.templates import environment
+from biogrip.physics.drawing import sketched
 from biogrip.physics.instruments import INSTRUMENTS
-from biogrip.physics.models import CANDIDATES
+from biogrip.physics.models import CANDIDATES, MODELS
 from biogrip.physics.shapes import KNOWN_SHAPES
 from biogrip.traces.columns import TIME_UNITS
 from biogrip.traces.reader import form_in_words
@@ -38,6 +39,7 @@ _SHOWN = {
     **{"known": KNOWN, "instruments": INSTRUMENTS, "limits": (LARGEST_MB, LONGEST_S // 60)},
     **{"candidates": CANDIDATES, "shapes": KNOWN_SHAPES, "units": TIME_UNITS, "outputs": _OUTPUTS},
     **{"remedies_by_column": remedies_by_column, "form_in_words": form_in_words},
+    **{"models": (*MODELS, "generalized_maxwell_2"), "sketched": sketched},
 }
 
 
