@@ -27,6 +27,7 @@ from biogrip.traces.tables import (
     find_tables,
     is_clock,
     number_or_inf,
+    numbers_of,
     read_sheet,
     seconds_or_inf,
 )
@@ -254,8 +255,7 @@ def _about_rise(
     for index, name in enumerate(table.names):
         if name in used or not plain_name(name).lower().startswith(controlled):
             continue
-        cells = sheet.cells[table.first : table.end, index][part.chosen].tolist()
-        loads = np.array([number_or_inf(cell.replace(",", ".")) for cell in cells])
+        loads = numbers_of(sheet, table, index)[part.chosen]
         level = np.median(loads[len(loads) // 2 :])
         away = np.abs(loads - level) > levels.SAME_SHARE * abs(level)
         rising = np.flatnonzero(away & (np.abs(loads) > levels.SAME_SHARE * abs(level)))

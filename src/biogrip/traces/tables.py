@@ -167,13 +167,16 @@ def overview(path: Path) -> tuple[Sheet, list[Table]]:
 
 
 def numbers_in(sheet: Sheet, table: Table) -> dict[str, Array]:
-    """Return the numbers of each column, (n_rows,), times of day in s; NaN or inf for others."""
-    numbers: dict[str, Array] = {}
-    for index in (index for index, name in enumerate(table.names) if name):
-        cells = [*map(str, sheet.cells[table.first : table.end, index])]
-        number = seconds_or_inf if is_clock(cells) else find_marks(cells, sheet.separator).number
-        numbers.setdefault(table.names[index], np.array([*map(number, cells)], dtype=float))
-    return numbers
+    """Return the numbers of each column that has a name, (n_rows,): see `numbers_of`."""
+    names = {name: index for index, name in reversed([*enumerate(table.names)]) if name}
+    return {name: numbers_of(sheet, table, names[name]) for name in reversed(names)}
+
+
+def numbers_of(sheet: Sheet, table: Table, index: int) -> Array:
+    """Return the numbers of a column, (n_rows,), times of day in s; NaN or inf for others."""
+    cells = [*map(str, sheet.cells[table.first : table.end, index])]
+    number = seconds_or_inf if is_clock(cells) else find_marks(cells, sheet.separator).number
+    return np.array([*map(number, cells)], dtype=float)
 
 
 def _cells(
