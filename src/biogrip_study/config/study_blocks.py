@@ -47,7 +47,8 @@ class ValueBlock(BaseModel):
     model_config = OPEN
     __pydantic_extra__: dict[str, Annotated[_Number | _Text, BY_KIND]] = Field(init=False)
 
-    label: Annotated[Printed, Field(description="Name of the value in print.")]
+    label: Printed
+    """Name of the value in print."""
 
 
 _Keys = Distinct[Annotated[tuple[str, ...], Field(min_length=1, max_length=100)]]
@@ -270,29 +271,19 @@ class StudyConfig(CommonBlocks, Shared):
     evaluation: Evaluation
     reconstructed: Annotated[tuple[str, ...], Field(max_length=1000)]
     """Keys, or whole blocks, whose values the paper does not give. Tables mark them."""
-    cases: Annotated[
-        Mapping[CaseName, CaseBlock],
-        Field(
-            max_length=_MOST_CASES,
-            description=f"The samples of the study, by name, at most {_MOST_CASES}. Any of the "
-            f"blocks {', '.join(OVERRIDABLE)} may be given in a case, too; its keys then hold for "
-            "this case alone.",
-        ),
-    ]
+    cases: Annotated[Mapping[CaseName, CaseBlock], Field(max_length=_MOST_CASES)]
+    """The samples of the study, by name, at most 2000. Any block that a study sets for all cases,
+    as gripper, protocol or measurement, may be given in a case, too; its keys then hold for this
+    case alone."""
     traces: TracesBlock | None = None
     """A table of recorded traces, which are identified in batches beside the cases, as `biogrip
     identify` does."""
     only: Distinct[Annotated[tuple[str, ...], Field(min_length=1, max_length=_MOST_CASES)]] = ()
     """Names of the cases to run; the others are left out. By default all under `cases`."""
     design: DesignBlock = field(default_factory=DesignBlock)
-    sweeps: Annotated[
-        Mapping[_SweepName, SweepBlock],
-        Field(
-            description=f"Grids of cases, by name, of at most {MOST_POINTS} points together. Every "
-            "point is a case that differs in two values; it is identified like others, and shown "
-            "in the sweep's table only."
-        ),
-    ] = field(default_factory=dict)
+    sweeps: Mapping[_SweepName, SweepBlock] = field(default_factory=dict)
+    """Grids of cases, by name, of at most 2000 points together. Every point is a case that differs
+    in two values; it is identified like others, and shown in the sweep's table only."""
     readings: Annotated[Mapping[_SweepName, ReadingBlock], Field(max_length=100)] = field(
         default_factory=dict
     )
