@@ -48,7 +48,10 @@ def documented() -> dict[str, Any]:
 
 
 def _kinds(kind: type) -> list[type]:
-    return [kind, *(of for below in kind.__subclasses__() for of in _kinds(below))]
+    kinds = [kind]
+    for subclass in kind.__subclasses__():
+        kinds += _kinds(subclass)
+    return kinds
 
 
 def _docstrings(kind: type) -> dict[str, str]:
@@ -58,8 +61,9 @@ def _docstrings(kind: type) -> dict[str, str]:
         # Those of methods are made without a source.
         if base.__module__.startswith("biogrip") and base.__name__ != "_MethodBlocks":
             (tree,) = ast.parse(textwrap.dedent(inspect.getsource(base))).body
-            for here, below in pairwise(tree.body):  # type: ignore[attr-defined]
-                match here, below:
+            pairs: Any = pairwise(tree.body)  # type: ignore[attr-defined]
+            for pair in pairs:
+                match pair:
                     case ast.AnnAssign(target=ast.Name(name)), ast.Expr(ast.Constant(str(text))):
                         found[name] = inspect.cleandoc(text)
     return found
