@@ -47,7 +47,7 @@ def documented() -> dict[str, Any]:
     return _shortened(schema)
 
 
-def _kinds(kind: type) -> list[type]:
+def _kinds(kind: Any) -> list[Any]:
     kinds = [kind]
     for subclass in kind.__subclasses__():
         kinds += _kinds(subclass)
