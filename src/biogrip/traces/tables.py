@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 from datetime import date
 from itertools import groupby, pairwise
 from math import inf, isfinite, nan
-from operator import eq
 from pathlib import Path
 from typing import Any
 
@@ -45,8 +44,7 @@ _LINE_END = re.compile(r"\r\n|\r|\n")
 # Empty lines and comments; #REF!, #DIV/0! or #NAME? followed by a separator are cells.
 _LEFT_OUT = re.compile(r" *(?:$|#(?!(?:[A-Z0-9/_]+[!?]|N/A|NV)\s*[,;\t]))")
 _COMMENT = re.compile(r"\s*(?:[#%]+|//+)[ \t]*")
-_BEFORE_NAMES = re.compile(r"(?:columns|names|fields|header)\s*[:=]\s*", re.I)
-_BEFORE_UNITS = re.compile(r"units?\s*[:=]\s*", re.I)
+_PREFIX = re.compile(r"[^\W\d]\w*\s*[:=]\s*")
 # Cells between blanks: quoted, or with a unit in brackets after a blank.
 _CELL = re.compile(r'"[^"]*"|[^\s"]+(?:[ \t]+[\[(][^\])\s]*[\])])?')
 _OTHERWISE = re.compile(r"[,;\t][\"\s]|[\"\s][,;\t]")
@@ -134,19 +132,14 @@ def read_sheet(path: Path, columns: MeasurementBlock) -> Sheet:
     quote has no end, or that file or line is too large.
     """
     encoding, lines = _read_lines(path)
-    without_end = len(lines) if lines[-1].strip() else 0
-    numbered = _with_names(lines, {*map(plain_name, columns.named.values())})
+    separator, numbered = _with_names(lines, {*map(plain_name, columns.named.values())})
     if not numbered:
         raise BiogripError(f"{place(path)}: found no header, allowed is a line with column names.")
-    lines, kept = [line for line, _ in numbered], np.array([number for _, number in numbered])
-    headers = [i for i, it in enumerate(lines) if i == 0 or kept[i] == 0 or not _ROW.match(it)]
-    named = separator = _separator(lines, [lines[i] for i in headers], columns)
-    if separator == BLANKS:
-        named, width = "\t", len(_CELL.findall(lines[-1]))
-        parted = [(_WIDE_GAP.split(line.strip()), _CELL.findall(line)) for line in lines]
-        lines = ["\t".join(wide if len(wide) == width else cells) for wide, cells in parted]
-    cells, widths = _cells(path, lines, kept, named)
-    return Sheet(encoding, separator, cells, widths, kept, headers, without_end)
+    kept, numbers = [line for line, _ in numbered], np.array([number for _, number in numbered])
+    headers = [i for i, it in enumerate(kept) if i == 0 or numbers[i] == 0 or not _ROW.match(it)]
+    cells, widths = _cells(path, kept, numbers, "\t" if separator == BLANKS else separator)
+    without_end = len(lines) if lines[-1].strip() else 0
+    return Sheet(encoding, separator, cells, widths, numbers, headers, without_end)
 
 
 def overview(path: Path) -> tuple[Sheet, list[Table]]:
@@ -247,77 +240,70 @@ def _read_text(path: Path) -> tuple[str, str]:
     )
 
 
-def _with_names(lines: Sequence[str], wanted: set[str]) -> list[tuple[str, int]]:
-    """Return lines with numbers from 1, without comments and empty ones, but with those of names.
+def _with_names(lines: Sequence[str], wanted: set[str]) -> tuple[str, list[tuple[str, int]]]:
+    """Return the separator, and lines with numbers from 1, without comments and empty ones.
 
-    Numbers of columns are names above the first row. Where no other line has the wanted names,
-    comments may have them.
+    Where no other line has the wanted names, comments may have them, or they are numbers of
+    columns, which then stand above the first row. Blanks between cells become tabs.
     """
     every = [(line, number) for number, line in enumerate(lines, 1)]
     kept = [own for own in every if not _LEFT_OUT.match(own[0])]
-    plain = [own for own in kept if not _COMMENT.match(own[0])]
-    first = next((own for own in plain if _ROW.match(own[0] + " ")), None)
-    if any(_has(line, wanted) for line, _ in plain if not _ROW.match(line)) or first is None:
-        return kept
-    if all(map(str.isdecimal, wanted)):
-        separator = max((*SEPARATORS[::-1], BLANKS), key=lambda it: len(_split(first[0], it)))
-        widest = range(1, len(_split(first[0], separator)) + 1)
-        names = (separator.join(map(str, widest)), 0)
-        return [*(own for own in plain if own[1] < first[1]), names, *plain[plain.index(first) :]]
-    said = {
-        number: _COMMENT.sub("", line, count=1) for line, number in every if _COMMENT.match(line)
-    }
-    headers = _headers_in(said, plain, first, wanted)
-    return _with_headers(every, said, headers) if headers else kept
+    words = [line for line, _ in kept if not _ROW.match(line)]
+    separator, common = _separator(kept, words, wanted)
+    first = next((own for own in kept if _ROW.match(own[0] + " ")), None)
+    if first and common < len(wanted):
+        kept = [own for own in kept if not _COMMENT.match(own[0])]
+        if all(map(str.isdecimal, wanted)):
+            names = range(1, len(_split(first[0], separator)) + 1)
+            kept.insert(kept.index(first), (separator.join(map(str, names)), 0))
+        else:
+            comments = [_said(line, bare=True) for line in lines if _COMMENT.match(line)]
+            separator, _ = _separator(kept, [*words, *comments], wanted)
+            kept = _with_comments(every, first[1], separator, wanted)
+    if separator == BLANKS:
+        width = _width(kept, separator)
+        kept = [("\t".join(_cells_of(line, separator, width)), number) for line, number in kept]
+    return separator, kept
 
 
-def _headers_in(
-    said: Mapping[int, str], plain: list[tuple[str, int]], first: tuple[str, int], wanted: set[str]
-) -> list[int]:
-    """Return which comments are names: those wanted, or the last before the first row, as wide."""
-    names = {number: _BEFORE_NAMES.sub("", text) for number, text in said.items()}
-    if found := [number for number, text in names.items() if _has(text, wanted)]:
-        return found
-    widths = [len(it) if len(it) > 1 else 0 for it in _splits(first[0])]
-    before = [*names.items(), *((number, line) for line, number in plain)]
-    likely = [
-        number
-        for number, text in before
-        if number < first[1] and any(map(eq, map(len, _splits(text)), widths))
-    ]
-    return [number for number in likely[-1:] if number in said]
-
-
-def _with_headers(
-    every: list[tuple[str, int]], said: Mapping[int, str], headers: list[int]
+def _with_comments(
+    every: Sequence[tuple[str, int]], first: int, separator: str, wanted: set[str]
 ) -> list[tuple[str, int]]:
-    """Return rows, and comments that are names, or above or below them of their header.
+    """Return lines that are no comments, and comments of a header, which may follow ``key: value``.
 
-    These are ``key: value`` above the names, ``units:`` below them, and words as many as the names.
+    These have the wanted names, or stand beside such or above the first row, with as many words.
     """
-    kept = list[tuple[str, int]]()
-    for in_comments, group in groupby(every, lambda line: not line[0].strip() or line[1] in said):
-        block = [*group]
-        at = next((i for i, (_, number) in enumerate(block) if number in headers), None)
+    kept, width = list[tuple[str, int]](), _width(every, separator)
+    for in_comments, group in groupby(
+        every, lambda own: not own[0].strip() or _COMMENT.match(own[0]) is not None
+    ):
+        block, header = [*group], list[tuple[str, int]]()
         if not in_comments:
             kept += block
-        elif at is not None:
-            texts = [(said.get(number, "").strip(), number) for _, number in block]
-            names = _BEFORE_NAMES.sub("", said[block[at][1]])
-            kept += (line for line in texts[:at] if ":" in line[0] or _as_wide(line[0], names))
-            kept.append((names, block[at][1]))
-            bare = ((_BEFORE_UNITS.sub("", text), text, number) for text, number in texts[at + 1 :])
-            kept += ((b, n) for b, text, n in bare if b != text or _as_wide(text, names))
+            continue
+        is_named = block[0][1] < first
+        for line, number in block:
+            cells = _cells_of(text := _said(line, bare=True), separator, width)
+            has_names = wanted <= _names(cells)
+            is_named |= has_names
+            if has_names or (len(cells) == width > 1 and not any(map(_NUMERIC.fullmatch, cells))):
+                header.append((text, number))
+        if header and is_named:
+            said = [(_said(line), number) for line, number in block if number < header[0][1]]
+            kept += [*(own for own in said if ":" in own[0]), *header]
     return kept
 
 
-def _as_wide(text: str, names: str) -> bool:
-    """Return True if a line has as many words as there are names, and no number among them."""
-    pairs = zip(_splits(text), _splits(names), strict=True)
-    return any(
-        len(words) == len(others) > 1 and not any(map(_NUMERIC.fullmatch, words))
-        for words, others in pairs
-    )
+def _said(line: str, *, bare: bool = False) -> str:
+    """Return what a comment says, if asked without a word before it, as ``columns:``."""
+    text = _COMMENT.sub("", line, count=1).strip()
+    return _PREFIX.sub("", text) if bare else text
+
+
+def _width(lines: Sequence[tuple[str, int]], separator: str) -> int:
+    """Return the number of cells in the last row of numbers."""
+    rows = (line for line, _ in reversed(lines) if _ROW.match(line + " "))
+    return len(_split(next(rows, ""), separator))
 
 
 def _split(line: str, separator: str) -> list[str]:
@@ -326,22 +312,22 @@ def _split(line: str, separator: str) -> list[str]:
     return [line] if _OTHERWISE.search(line) else _CELL.findall(line)
 
 
-def _splits(line: str) -> list[list[str]]:
-    """Return the cells of a line by every separator, and by gaps of at least two blanks."""
-    return [*(_split(line, it) for it in (*SEPARATORS, BLANKS)), _WIDE_GAP.split(line.strip())]
-
-
-def _has(line: str, wanted: set[str]) -> bool:
-    return any(wanted <= _names(cells) for cells in _splits(line))
+def _cells_of(line: str, separator: str, width: int) -> list[str]:
+    """Return the cells of a line; words with single blanks are one if there are then as many."""
+    if separator != BLANKS:
+        return line.split(separator)
+    wide = _WIDE_GAP.split(line.strip())
+    return wide if len(wide) == width else _CELL.findall(line)
 
 
 def _names(cells: Sequence[str]) -> set[str]:
     return {plain_name(_QUOTED.sub(r"\1", cell)) for cell in cells}
 
 
-def _separator(lines: Sequence[str], headers: Sequence[str], columns: MeasurementBlock) -> str:
-    """Return the separator by which a line has most columns to read, or which most lines have."""
-    wanted = {*map(plain_name, columns.named.values())}
+def _separator(
+    lines: Sequence[tuple[str, int]], headers: Sequence[str], wanted: set[str]
+) -> tuple[str, int]:
+    """Return what parts most wanted names in a header, or the cells of most lines; and how many."""
 
     def merit(separator: str) -> tuple[int, int]:
         common = 0
@@ -349,10 +335,13 @@ def _separator(lines: Sequence[str], headers: Sequence[str], columns: Measuremen
             wide = _WIDE_GAP.split(row.strip()) if separator == BLANKS else []
             of = (len(wanted & _names(cells)) for cells in (_split(row, separator), wide))
             common = max(common, *of)
-        return common, sum(len(_split(it, separator)) > 1 for it in lines[:_LINES_SEARCHED])
+        parted = (len(_split(line, separator)) > 1 for line, _ in lines[:_LINES_SEARCHED])
+        return common, sum(parted)
 
     # Where as many lines have commas as tabs or semicolons, these are decimal commas.
-    return max((*SEPARATORS[::-1], BLANKS), key=merit)
+    merits = {separator: merit(separator) for separator in (*SEPARATORS[::-1], BLANKS)}
+    separator = max(merits, key=lambda it: merits[it])
+    return separator, merits[separator][0]
 
 
 def find_tables(
