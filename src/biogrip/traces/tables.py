@@ -10,9 +10,10 @@ cells; and a table without names has numbers of columns.
 import csv
 import re
 from codecs import BOM_UTF16_BE, BOM_UTF16_LE
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from datetime import date
+from datetime import datetime, timedelta
 from itertools import groupby, pairwise
 from math import inf, isfinite, nan
 from pathlib import Path
@@ -56,11 +57,8 @@ _ROW = re.compile(r'[\s",;]*[-+]?[.\d][\d.,:eE+-]*[\s",;]')
 # Numbers with points or commas, and of these such whose marks may be between thousands.
 _MARKED = re.compile(r"[-+]?\d*[.,][\d.,]*(?:[eE][-+]?\d+)?")
 _IN_THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2}([.,])\d{3}(?:\1\d{3})*")
-# Thousands with blanks or apostrophes between them.
-_GAPPED = re.compile(r"(?<![\d.,])[1-9]\d{0,2}(?:['\u2019 \u00a0\u2009\u202f]\d{3})+(?!\d)")
-_DATE = r"(?:(\d{4})-(\d\d)-(\d\d)[T ]|(\d\d)\.(\d\d)\.(\d{4})[T ])?"
-_ZONE = r"(?:Z|([-+])(\d\d):?(\d\d))?"
-_CLOCK = re.compile(_DATE + r"(\d{1,6}):([0-5]\d):([0-5]\d(?:[.,]\d+)?)" + _ZONE)
+_CLOCK = re.compile(r"(\d{1,6}):([0-5]\d):([0-5]\d(?:[.,]\d+)?)")
+_DATE = re.compile(r"(\d\d)\.(\d\d)\.(\d{4})")
 DAY_S = 86_400
 """Seconds of a day."""
 _GAPS = ("", "-", "na", "n/a", "#n/a", "#nv")
@@ -153,7 +151,7 @@ def overview(path: Path) -> tuple[Sheet, list[Table]]:
         tables = _tables(sheet, columns) or [_likely_table(sheet)]
         longest = max(tables, key=lambda table: table.end - table.first)
         # With two of its columns, every table that has them is found; without names, by numbers.
-        words = [name for name in dict.fromkeys(longest.names) if name and not _is_number(name)]
+        words = [name for name in dict.fromkeys(longest.names) if name and not is_number(name)]
         first, second, *_ = [*words, "1", "2"]
         columns = replace(columns, time=first, strain=second)
     return sheet, tables
@@ -168,8 +166,7 @@ def numbers_in(sheet: Sheet, table: Table) -> dict[str, Array]:
 def numbers_of(sheet: Sheet, table: Table, index: int) -> Array:
     """Return the numbers of a column, (n_rows,), times of day in s; NaN or inf for others."""
     cells = [*map(str, sheet.cells[table.first : table.end, index])]
-    number = seconds_or_inf if is_clock(cells) else find_marks(cells, sheet.separator).number
-    return np.array([*map(number, cells)], dtype=float)
+    return np.array([*map(number_reader(cells, decimal_mark(cells, sheet.separator)[0]), cells)])
 
 
 def _cells(
@@ -362,10 +359,9 @@ def find_tables(
         return tables, [block - 1 for block in columns.blocks]
     said, allowed = f"no block {missing[0] if missing else 0}", f"are 1 to {len(tables)}:"
     if not columns.blocks:
-        names, option = ", ".join(f"'{name}'" for name in columns.named.values()), "block: 1"
-        option, joined = ("--block 1", "--block 1,2") if columns.by_options else (option, "[1, 2]")
+        names = ", ".join(f"'{name}'" for name in columns.named.values())
         said = f"{counted(count, 'block')} with the columns {names}"
-        allowed = f"is one, as by {option}, or several that are one test, as by {joined}."
+        allowed = "is one, as by --block 1, or several that are one test, as by --block 1,2."
     shown = [
         f"\n  {number}: {_in_words(sheet, table, columns)}"
         for number, table in enumerate(tables[:_TABLES_SHOWN], 1)
@@ -518,7 +514,7 @@ def _in_preamble(cells: Sequence[str], width: int) -> bool:
     """Return True if cells are no row, even a damaged one: few, or beginning like ``Test:``."""
     filled = [i for i, cell in enumerate(cells) if cell]
     first = cells[filled[0]] if filled else ":"
-    return first.endswith(":") or (not _is_number(first) and filled[-1] + 1 < width)
+    return first.endswith(":") or (not is_number(first) and filled[-1] + 1 < width)
 
 
 def _title(sheet: Sheet, start: int, table: Table) -> str:
@@ -528,84 +524,52 @@ def _title(sheet: Sheet, start: int, table: Table) -> str:
 
 
 def _count_numbers(cells: Sequence[str]) -> int:
-    return sum(map(_is_number, cells))
+    return sum(map(is_number, cells))
 
 
-def _is_number(cell: str) -> bool:
+def is_number(cell: str) -> bool:
     """Return True if a cell is a finite number, with a decimal point or comma."""
     return isfinite(number_or_inf(cell.replace(",", ".")))
 
 
-@dataclass(frozen=True)
-class Marks:
-    """Marks in the numbers of a table."""
-
-    decimal: str = "."
-    """The decimal mark; empty if it cannot be told."""
-    thousands: str = ""
-    """What is between thousands, blank for blanks and apostrophes."""
-    cells: tuple[str, ...] = ()
-    """Cells that leave it open: one whose mark may as well be between thousands, or two that speak
-    against each other."""
-
-    def number(self, cell: str) -> float:
-        """Return a cell's number: see `number_or_inf`."""
-        if self.thousands == " ":
-            cell = _without_gaps(cell)
-        elif self.thousands:
-            cell = re.sub(rf"(?<=\d)[{self.thousands}](?=\d{{3}}(?!\d))", "", cell)
-        return number_or_inf(cell.replace(self.decimal, "."))
-
-
-def _without_gaps(text: str) -> str:
-    return _GAPPED.sub(lambda found: re.sub(r"\D", "", found[0]), text)
-
-
-def find_marks(cells: Sequence[str], separator: str) -> Marks:
+def decimal_mark(cells: Sequence[str], separator: str) -> tuple[str, str]:
     """Tell the decimal mark of a table's numbers, which is one for all columns.
 
-    A mark is decimal if it is nowhere, or in one cell not, where one between thousands would be.
-    Between commas that part cells no comma is.
+    Where it may everywhere as well be between thousands, such a cell is returned, too. Between
+    commas that part cells no comma is decimal.
     """
-    written = "\n".join(cells)
-    text = _without_gaps(written)
-    plain, blank = text.split("\n"), " " * (text != written)
-    present = [mark for mark in ".," if mark in text]
-    sure: dict[str, str] = {}
-    for cell, number in zip(cells, plain, strict=False):
-        if len(sure) == len(present):
-            break
-        if _MARKED.fullmatch(number) and not _IN_THOUSANDS.fullmatch(number):
-            sure.setdefault(max(present, key=number.rfind), cell)
-    if separator == "," and present:
-        sure = {".": ""}
-    if len(sure) == 1:
-        (decimal,) = sure
-        others = "".join(mark for mark in present if mark != decimal)
-        return Marks(decimal, others or blank)
-    if not present:
-        return Marks(thousands=blank)
-    either = tuple(sure.values()) or tuple(next(c for c in cells if m in c) for m in present)
-    if len(present) > 1:
-        return Marks("", blank, either)
-    if any(it.count(present[0]) > 1 for it in plain if _IN_THOUSANDS.fullmatch(it)):
-        return Marks(".,".replace(present[0], ""), present[0])
-    return Marks(present[0], blank, either)
+    unclear: tuple[str, str] | None = None
+    for cell in cells if separator != "," else ():
+        if ("." in cell or "," in cell) and _MARKED.fullmatch(cell):
+            mark = max(".,", key=cell.rfind)
+            if not _IN_THOUSANDS.fullmatch(cell):
+                return mark, ""
+            unclear = unclear or (mark, cell)
+    return unclear or (".", "")
+
+
+def number_reader(cells: Sequence[str], decimal: str) -> Callable[[str], float]:
+    """Return what reads cells of a column, as seconds or as numbers with such a decimal mark.
+
+    It gives NaN for a gap, and inf for what it cannot read.
+    """
+    other = ".,".replace(decimal, "")
+    if is_clock(cells):
+        return seconds_or_inf
+    return lambda cell: inf if other in cell else number_or_inf(cell.replace(decimal, "."))
 
 
 def seconds_or_inf(cell: str) -> float:
     """Return seconds of hours, minutes, seconds, and perhaps a date, else as `number_or_inf`."""
-    if not (found := _CLOCK.fullmatch(cell)):
-        return nan if cell.lower() in _GAPS else inf
-    *days, hours, minutes, seconds, sign, zone_h, zone_min = found.groups()
-    year, month, day = days[:3] if days[0] else days[:2:-1]
-    try:
-        count = date(int(year), int(month), int(day)).toordinal() if year else 0
-    except ValueError:
-        return inf
-    zone_s = 3600 * int(zone_h or 0) + 60 * int(zone_min or 0)
-    passed_s = DAY_S * count + 3600 * int(hours) + 60 * int(minutes)
-    return passed_s + (zone_s if sign == "-" else -zone_s) + float(seconds.replace(",", "."))
+    if found := _CLOCK.fullmatch(cell):
+        hours, minutes, seconds = found.groups()
+        return 3600 * int(hours) + 60 * int(minutes) + float(seconds.replace(",", "."))
+    if cell.count(":") > 1:
+        with suppress(ValueError):
+            moment = datetime.fromisoformat(_DATE.sub(r"\3-\2-\1", cell))
+            passed = moment.replace(tzinfo=None) - datetime.min
+            return (passed - (moment.utcoffset() or timedelta())).total_seconds()
+    return nan if cell.lower() in _GAPS else inf
 
 
 def is_clock(cells: Sequence[str]) -> bool:
