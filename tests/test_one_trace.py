@@ -239,7 +239,7 @@ def test_text_that_is_no_value_of_an_option_is_refused() -> None:
         ("--hold", "0", "allowed is a number, and not 0"),
         *(("--hold", text, "allowed is a number, or one with") for text in ("nan", "much")),
         ("--hold", "-5,0%", "a decimal comma? Allowed is a point"),
-        ("--set", "a.b=[1", "a.b: not valid YAML: "),
+        ("--set", "a.b=[1", "a.b: not usable YAML: "),
         ("--set", "a.b=1:30", "a.b: found 1:30, which YAML reads in base 60"),
     ):
         with redirect_stderr(StringIO()) as error, pytest.raises(SystemExit):

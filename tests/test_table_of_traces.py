@@ -139,7 +139,7 @@ def test_all_that_is_wrong_with_a_table_is_said_at_once(tmp_path: Path) -> None:
         f"4, column 'file': found '{tmp_path}/a.csv' again, as on line 3; allowed is each trace "
         "once, or a column 'reading' that tells which, as in strain=COLUMN.",
     ]
-    assert below == [[f"{n}, column 'measurement.skip'", " not valid YAML"] for n in (3, 4)]
+    assert below == [[f"{n}, column 'measurement.skip'", " not usable YAML"] for n in (3, 4)]
     write(path, "file|fixed.c", *(f"{number}.csv|[1" for number in range(30)))
     assert refused(path)[10:] == ["... and 20 more."]
 

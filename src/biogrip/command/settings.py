@@ -45,7 +45,7 @@ from biogrip.physics.instruments import (
 from biogrip.physics.models import ALIASES, CANDIDATES
 from biogrip.physics.shapes import KNOWN_SHAPES
 from biogrip.traces.columns import held_unit, place
-from biogrip.traces.measurement_block import ARRAYS, READINGS, ByOptions, MeasurementBlock
+from biogrip.traces.measurement_block import ARRAYS, READINGS, MeasurementBlock
 from biogrip.traces.reader import Recording, read_recording, recording_of_arrays
 
 MODEL = "generalized_maxwell"
@@ -182,7 +182,7 @@ def read_trace(asked: Asked) -> tuple[Recording, SampleCase]:
     A `BiogripError` has file, line and column, or setting, that cannot be used.
     """
     case, recording = case_of(asked)
-    columns = ByOptions(**vars(case.block.measurement))
+    columns = case.block.measurement
     # What its protocol follows from was read before the protocol's start was known.
     recording = replace(recording, read=columns) if recording else asked.read(columns)
     said = (*recording.remarks_before, *remarks_on_hold(recording, case, asked.given))

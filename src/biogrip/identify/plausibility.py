@@ -161,8 +161,6 @@ def _check_times(recording: Recording, torque: Course) -> None:
     hint = _other_units(recording.units[0], TIME_UNITS, fits)
     if not hint and onset_s is None:
         how = "--start says when, be it 0, or --start fit finds it"
-        if not columns.by_options:
-            how = "start_s under measurement says when, be it 0, or fit_start: true finds it"
         hint = f" If the protocol starts after readings, or not at 0 of the clock, {how}."
     for sample in np.flatnonzero((time_s < earliest) | (time_s > end_s + slack))[:1]:
         raise BiogripError(
