@@ -10,7 +10,7 @@ from tests.helpers.runs import SMALL, TINY, clone, dry_run, jobs_of, planned, re
 
 # What puts all cases together, whatever changed, and what compares their identifications.
 TOLD = {"claims": 1, "page": 1}
-COMPARED = TOLD | dict.fromkeys(("errors", "methods", "moduli", "overview"), 1)
+COMPARED = TOLD | dict.fromkeys(("errors", "methods", "overview"), 1)
 # Of a simulated case, from its traces to their judgement, with one batch of them; and what of the
 # study reads these.
 TRACES = {"measurement": 1, "identification": 2, "model_fits": 1, "intervals": 1, "judgement": 1}
@@ -80,7 +80,7 @@ def test_a_table_and_a_figure_take_the_jobs_whose_files_they_need(tmp_path: Path
     """Of one sample and two methods: no intervals, no models, no verdicts."""
     identified = {"target": 1, "measurement": 1, "identification": 2, "case_tables": 1}
     config = SMALL | {"only": ["liquid_drop_2"]}
-    for target, rule in (("tables/errors.csv", "errors"), ("figures/moduli.png", "moduli")):
+    for target, rule in (("tables/errors.csv", "errors"), ("tables/methods.csv", "methods")):
         assert planned(tmp_path, f"results/{target}", config=config) == {**identified, rule: 1}
 
 

@@ -148,7 +148,7 @@ OTHER_TABLES += ["protocols"] * bool(OTHERS)
 GRIPPER_FIGURES = ["comb", "linkage", "torque"] if HAS_GRIPPER else []
 PAPER_FIGURES = ["protocols"] * bool(OTHERS) + ["referee"] * (len(STUDY.config.readings) > 1)
 FIGURES = ["answer"] if ANSWERED else []
-FIGURES += ["moduli", "overview"] if STUDY.simulated else []
+FIGURES += ["overview"] if STUDY.simulated else []
 # Those of a case, with the functions that draw them, and the first cases, as many as a page shows.
 OF_EVERY_CASE = {
     "convergence": "biogrip_study.figures.course.draw_convergence",
@@ -159,7 +159,6 @@ OF_EVERY_CASE = {
 }
 OF_SIMULATED = {
     "force": "biogrip_study.figures.case_fit.draw_force",
-    "scatter": "biogrip_study.figures.course.draw_scatter",
     "waterfall": "biogrip_study.figures.course.draw_waterfall",
 }
 FIRST = STUDY.of(STUDY.simulated[:3])

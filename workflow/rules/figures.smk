@@ -22,7 +22,7 @@ rule case_figures:
     params:
         **settings_of(
             *"actuator methods seeds evaluation title published contact models".split(),
-            *("genetic_algorithm", "identifiability.confidence", *FIT, *SAMPLING, NOISE),
+            *("genetic_algorithm", *FIT, *SAMPLING),
         ),
         stages=[*OF_EVERY_CASE.values(), *OF_SIMULATED.values()],
     message:
@@ -74,26 +74,6 @@ rule answer:
         stages=["biogrip_study.figures.overview.draw_answer"],
     message:
         "Drawing what a trace tells"
-    script:
-        "../scripts/figures.py"
-
-
-rule moduli:
-    input:
-        identifications=files("results/identifications/{case}.csv", FIRST.cases),
-        targets=files("results/targets/{case}.csv", FIRST.cases),
-    output:
-        moduli=drawing("moduli"),
-    log:
-        "results/logs/moduli.log",
-    params:
-        **settings_of(
-            *("methods", "seeds", "evaluation", "actuator"),
-            *keys_of_cases(FIRST, *FIT, "title", *SAMPLING, NOISE),
-        ),
-        stages=["biogrip_study.figures.overview.draw_moduli"],
-    message:
-        "Drawing the moduli of the fits"
     script:
         "../scripts/figures.py"
 
