@@ -137,6 +137,7 @@ def estimate_intervals(
         if len(informed):
             simpler = experiment.of_each(time_s, traces, rest_known)
             known[:, informed] = fit_from(simpler, truth[informed]).x
+        told = {(seed, quantity): [""] * 7 for seed in group for quantity in every}
         for in_full, shown in ((True, every), (False, selected)):
             some = [i for i, seed in enumerate(group) if (seed % often == 0) == in_full]
             if not (some and shown):
@@ -149,9 +150,10 @@ def estimate_intervals(
                     ends = finding.low, finding.high
                     limits = ("" if end is None else f"{end:.5g}" for end in ends)
                     verdict = (finding.verdict, *limits) if in_full else ("", "", "")
-                    rows.append((case.name, quantity.label, group[i], *texts, *verdict))
+                    told[group[i], quantity] = [*texts, *verdict]
+        rows += ((case.name, of.label, seed, *texts) for (seed, of), texts in told.items())
         progress.done(len(group))
-    INTERVALS.write(intervals, sorted(rows, key=lambda row: row[2]))
+    INTERVALS.write(intervals, rows)
 
 
 def _rest_known(
