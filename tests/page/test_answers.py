@@ -1,6 +1,3 @@
-from typing import Any
-
-from biogrip.physics.models import CANDIDATES
 from biogrip_study.page import answers
 
 TITLES = {"cell": "A cell", "drop": "A drop"}
@@ -64,46 +61,3 @@ def test_medians_stand_beside_targets() -> None:
     assert humps["this study: median"] == "spread over decades"
     near = row | {"basin": "near the noise", "seeds": "23"}
     assert answers.compared_rows([row, near], VERDICTS, TITLES) == [found]
-
-
-def recorded(fit: str, **verdicts: str) -> dict[str, Any]:
-    found = [verdict("", *told) | {"provided": None} for told in verdicts.items()]
-    return {"fit": fit, "quantities": found}
-
-
-def test_a_recorded_trace_has_a_sentence_and_several_have_shares() -> None:
-    told = {"k": "determined", "k_p": "bounded above", "c": "determined", "c_p": "determined"}
-    one = recorded("doubtful", **told)
-    one["quantities"][3]["provided"] = "it relaxes"
-    assert answers.say_what_recordings_tell([one]) == (
-        "This trace determines k, c and c_p (provided it relaxes); it bounds from above only k_p. "
-        "Of the fits, 1 doubtful."
-    )
-    other = recorded("rejected", k="fit rejected", k_p="fit rejected")
-    assert answers.say_what_recordings_tell([one, recorded("ok", k="determined"), other]) == (
-        "Of 3 traces, k is determined in 2, k_p is determined in 0, c is determined in 1 and c_p "
-        "is determined in 1. Of the fits, 1 doubtful and 1 rejected."
-    )
-    assert answers.say_what_recordings_tell([other]).startswith("The model cannot give this trace")
-    assert answers.say_what_recordings_tell([]) == ""
-
-
-def test_a_better_model_is_named_with_what_it_gains() -> None:
-    """By the words of `identify`; 4 and 2 parameters, and ΔAIC as of 800 readings."""
-    full, maxwell = "generalized_maxwell", "maxwell"
-    rows = [
-        {"case": case, "model": CANDIDATES[name].model.title}
-        | {"median_delta_aic": aic, "median_delta_bic": bic}
-        for case, name, aic, bic in (
-            *(("a", full, "4", "13.4"), ("a", maxwell, "0", "0")),
-            *(("b", full, "0", "0"), ("b", maxwell, "89", "80")),
-        )
-    ]
-    for case, own, fit, said in (
-        ("a", full, "ok", "(--model maxwell), fits as well, with a BIC lower by 13.4."),
-        ("b", maxwell, "ok", "(--model generalized_maxwell) is preferred, with a BIC lower by 80."),
-        *(("a", full, "rejected", ""), ("b", full, "ok", ""), ("c", full, "ok", "")),
-    ):
-        told = answers.say_which_model_is_better(rows, case, own, fit)
-        assert told.endswith(said)
-        assert bool(told) == bool(said)

@@ -129,6 +129,7 @@ rule page:
             *(key for key in STUDY_KEYS if key != "cases"),
             *keys_of_cases(STUDY, *CASE_KEYS),
         ),
+        shown=SHOWN,
         stages=["biogrip_study.page.page.write_report"],
     message:
         "Writing the page of the study"
