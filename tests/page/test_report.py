@@ -99,7 +99,7 @@ def test_the_page_answers_first_and_from_its_tables(opened: Opened, report: Path
     captions = [text.split(". ", 1)[1] for text in map(str.strip, told) if ". " in text]
     assert len(captions) == len(set(captions)) > 5
     shown = page.locator("figure:visible").evaluate_all("all => all.map(f => f.id)")
-    assert shown == ["sliders", "figure-answer", "figure-fit_liquid_drop_2"]
+    assert shown == ["sliders", "figure-fit_liquid_drop_2"]
 
 
 def test_menu_links_land_where_they_say(visit: Any, report: Path) -> None:

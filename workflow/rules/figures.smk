@@ -9,7 +9,6 @@ rule case_figures:
         measurements=of_case("results/measurements/{case}/{batch}.npz"),
         verdicts="results/identifiability/{case}.json",
         expected=of_case("results/identifiability/expected/{case}.json", STUDY.simulated),
-        target=of_case("results/targets/{case}.csv", STUDY.simulated),
         calibrated=calibration_of,
     output:
         **{name: drawing(name, "{case}") for name in [*OF_EVERY_CASE, *OF_SIMULATED]},
@@ -21,7 +20,7 @@ rule case_figures:
         case=names(STUDY.simulated),
     params:
         **settings_of(
-            *"actuator methods seeds evaluation title published contact models".split(),
+            *"actuator methods seeds evaluation title published".split(),
             *("genetic_algorithm", *FIT, *SAMPLING),
         ),
         stages=[*OF_EVERY_CASE.values(), *OF_SIMULATED.values()],
@@ -56,26 +55,6 @@ rule summary:
         "Summing up what the judged trace of {wildcards.case} tells"
     script:
         "../scripts/stage.py"
-
-
-rule answer:
-    input:
-        verdicts=files("results/identifiability/{case}.json", ANSWERED),
-        measurements=first_traces(ANSWERED),
-        calibrated=files(
-            "results/calibrations/{case}.yaml", [name for name in ANSWERED if name in CALIBRATED]
-        ),
-    output:
-        answer=drawing("answer"),
-    log:
-        "results/logs/answer.log",
-    params:
-        **settings_of("actuator", *keys_of_cases(STUDY.of(ANSWERED), *FIT)),
-        stages=["biogrip_study.figures.overview.draw_answer"],
-    message:
-        "Drawing what a trace tells"
-    script:
-        "../scripts/figures.py"
 
 
 rule overview:

@@ -1,4 +1,4 @@
-"""Figures of a study: fits and identifications about the truth, and what a trace tells."""
+"""A study at a glance: a fit, and identifications about the truth."""
 
 from pathlib import Path
 from typing import Any
@@ -7,13 +7,10 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle
 
 import biogrip_study.records.identifications as records
-from biogrip.digits import with_unit
 from biogrip.figures import style
 from biogrip.figures.fit import draw_traces
-from biogrip.figures.likelihood import draw_profile
 from biogrip.judging.quantities import parameters_and_sum, quantity_value
 from biogrip.judging.verdicts import BOUNDED_ABOVE
 from biogrip_study.config.study import Case, Study
@@ -87,42 +84,3 @@ def _draw_ratios(axes: Axes, case: Case, fits: pd.DataFrame, bounded: set[str]) 
             axes.plot([x - 0.4, x + 0.4], [shown, shown], color=style.PAPER)
     axes.set(yscale="log", ylim=(1 / (2 * _WORST), 2 * _WORST))
     axes.set_xticks(range(len(ticks)), ticks)
-
-
-def draw_answer(study: Study, verdicts: Path, measurements: Path) -> Figure:
-    """Draw a gripper, the judged trace of the only case, and what it tells of two dampers."""
-    (case,) = study.cases.values()
-    judged = records.read_verdicts(verdicts)
-    items = {item["quantity"]: item for item in judged["quantities"]}
-    drawn = style.figure(style.COLUMN_IN, 3.4)
-    (device, trace), profiles = drawn.subplots(2, 2)
-    _device(device)
-    style.panel(device, "1", "two arms squeeze")
-    fit = case_fit.judged_fit(case, judged, measurements)
-    factor, unit = draw_traces(trace, {"fit": fit})
-    trace.set_ylim(top=1.45 * factor * fit.measured.max())
-    trace.set(xlabel="time (s)", ylabel=with_unit("rotation", unit))
-    handles, _ = trace.get_legend_handles_labels()
-    trace.legend(handles[::2], ["trace", "fit"], loc="upper right", ncols=2, columnspacing=1)
-    style.panel(trace, "2", "one of them turns")
-    names = [name for name in case.sample.model.names if name in case.sample.model.exchangeable]
-    for number, axes, name in zip("34", profiles, (" + ".join(names), names[1]), strict=True):
-        draw_profile(axes, items[name])
-        axes.axhline(judged["threshold"], color=style.BLACK, linestyle="--", linewidth=0.7)
-        place = (0.02, judged["threshold"] + 0.2, f"{100 * judged['confidence']:g} %")
-        axes.text(*place, transform=axes.get_yaxis_transform(), fontsize=7)
-        style.panel(axes, number, f"{items[name]['symbol']}: {items[name]['verdict']}")
-    profiles[0].set_ylabel("rise of χ²")
-    return drawn
-
-
-def _device(axes: Axes) -> None:
-    axes.add_patch(Circle((0, 3.0), 0.34, color=style.ORANGE))
-    for side in (-1, 1):
-        axes.plot([side * 1.2, side * 0.32], [0, 3.1], color=style.BLUE, linewidth=4)
-        axes.plot(side * 1.2, 0, "o", color="white", markeredgecolor=style.BLACK, markersize=6)
-        arrow = {"arrowstyle": "->", "lw": 1.0, "color": style.BLACK}
-        axes.annotate("", (side * 0.65, 1.5), (side * 1.5, 1.5), arrowprops=arrow)
-    axes.annotate("torque", (0, 1.5), ha="center", va="center", fontsize=7)
-    axes.set(xlim=(-1.8, 1.8), ylim=(-0.3, 3.5), aspect="equal")
-    axes.set_axis_off()

@@ -175,7 +175,7 @@ def _answered(study: Study, downloads: Sequence[Path]) -> dict[str, Any]:
 def _placed(
     study: Study, drawn: Sequence[Entry], listed: Sequence[Entry], owners: Mapping[str, str]
 ) -> dict[str, Any]:
-    """Return figures, what a trace tells, the story, and all others folded, and tables by place."""
+    """Return figures by their place, the story and all others, folded, and tables."""
     if study.published:
         story = _as_in_paper(drawn, study)
     else:
@@ -184,15 +184,13 @@ def _placed(
             for entries in (drawn, listed)
         )
         story = [entry for entry in drawn if entry.name in _UNFOLDED]
-    told = [replace(entry, title="What a trace tells") for entry in drawn if entry.name == "answer"]
-    unfolded = {entry.file for entry in told + story}
+    unfolded = {entry.file for entry in story}
     folded: dict[str, list[Entry]] = {}
     for entry in drawn:
         if entry.file not in unfolded:
             folded.setdefault(owners.get(entry.whose, "The study"), []).append(entry)
     once = _each_caption_once(listed)
     return {
-        "told": told,
         "story": story,
         "folded": folded,
         "evidence_tables": [entry for entry in once if entry.name in _EVIDENCE],
