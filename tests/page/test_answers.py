@@ -3,13 +3,6 @@ from biogrip_study.page import answers
 TITLES = {"cell": "A cell", "drop": "A drop"}
 
 
-def verdict(case: str, quantity: str, told: str = "determined") -> dict[str, str]:
-    return {"case": case, "quantity": quantity, "verdict": told}
-
-
-VERDICTS = [verdict("drop", "k", "not determined"), verdict("drop", "c")]
-
-
 def covered(case: str, quantity: str, hits: str, runs: str = "20") -> dict[str, str]:
     return {"case": case, "quantity": quantity, "shown_determined": hits, "shown_seeds": runs}
 
@@ -45,19 +38,3 @@ def test_the_surest_method_is_named_before_the_study_s_own() -> None:
     )
     assert answers.say_which_method_finds_it([], OWN) == ""
     assert answers.say_what_the_study_gives(METHODS, "other", TITLES, "The", 1.0) == ""
-
-
-def test_medians_stand_beside_targets() -> None:
-    """With errors of a run; no median between humps, no row that no trace determines."""
-    row = {"case": "drop", "unit": "N s/m", "target": "0.001", "seeds": "50", "basin": "all"}
-    row |= {"median_identified": "0.0039", "p25_identified": "0.001", "p75_identified": "0.0051"}
-    row |= {"parameter": "c", "median_absolute_error_percent": "290.4"}
-    every = [row, row | {"parameter": "c_p"}]
-    (found,) = answers.compared_rows(every, VERDICTS, TITLES)
-    assert [text.replace("\xa0", " ") for text in found.values()] == [
-        *("A drop", "c (N s/m)", "0.001", "0.0039 (290 %)", "0.001 to 0.0051")
-    ]
-    (humps,) = answers.compared_rows([row | {"p25_identified": "1.1e-05"}], VERDICTS, TITLES)
-    assert humps["this study: median"] == "spread over decades"
-    near = row | {"basin": "near the noise", "seeds": "23"}
-    assert answers.compared_rows([row, near], VERDICTS, TITLES) == [found]

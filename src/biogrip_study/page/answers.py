@@ -4,8 +4,6 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 
 from biogrip.digits import legible, plain, with_unit
-from biogrip.judging.verdicts import DETERMINED
-from biogrip_study.records.identifications import ALL
 
 TableRow = Mapping[str, str]
 
@@ -105,42 +103,10 @@ def rows_beside_the_paper(
     ]
 
 
-def compared_rows(
-    errors: Iterable[TableRow], verdicts: Iterable[TableRow], titles: Mapping[str, str]
-) -> list[dict[str, str]]:
-    """Return targets beside the study's results, with the median error of a run in brackets.
-
-    Quantities that no case determines are left out, and medians between quartiles a decade apart:
-    runs in two humps have none near their median. Rows are those of the tables of errors and
-    verdicts, titles those of the cases.
-    """
-    decided = {row["quantity"] for row in verdicts if row["verdict"] == DETERMINED}
-    return [
-        {
-            "sample": titles[row["case"]],
-            "quantity": legible(with_unit(row["parameter"], row["unit"])),
-            "target": _legible_number(row["target"]),
-            "this study: median": _median(row),
-            "quartiles": _ends(row, "p25_identified", "p75_identified"),
-        }
-        for row in errors
-        if row["parameter"] in decided and row["basin"] == ALL and row["target"]
-    ]
-
-
 def _ends(row: TableRow, low: str, high: str, unit: str = "", digits: int = 4) -> str:
     return legible(
         f"{_legible_number(row[low], digits)} to {_legible_number(row[high], digits)}{unit}"
     )
-
-
-def _median(row: TableRow) -> str:
-    low, high = float(row["p25_identified"]), float(row["p75_identified"])
-    if high > 10 * low:
-        return "spread over decades"
-    error = row["median_absolute_error_percent"]
-    said = f" ({plain(float(f'{float(error):.2g}'))} %)" if error else ""
-    return _legible_number(row["median_identified"]) + legible(said)
 
 
 def share_of(row: TableRow) -> str:

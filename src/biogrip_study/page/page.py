@@ -31,8 +31,8 @@ from biogrip_study.stages.judgement import JUDGED_SEED
 # Characters left for images in a report of at most 8 MB.
 _MOST_PICTURE_LETTERS = 2_800_000
 _LIBRARIES = ("numpy", "scipy", "pandas", "matplotlib", "snakemake")
-# Tables, or beginnings of their names, that answers are written from.
-_ANSWERING = "errors.csv", "verdicts_", "coverage.csv", "methods.csv", "tables_5_to_7.csv"
+# Tables that answers are written from.
+_ANSWERING = "coverage", "methods", "tables_5_to_7"
 # Tables under what is reconstructed; the others are under their heading.
 _EVIDENCE = ("gripper", "gene_ranges", "evidence", "printed_values")
 # What only the paper's page shows of the gripper and the default search ranges.
@@ -149,9 +149,9 @@ def write_report(
 
 
 def _answered(study: Study, downloads: Sequence[Path]) -> dict[str, Any]:
-    """Return the answers, and results beside the paper's or the truth."""
-    errors, verdicts, coverage, methods, beside = (
-        [row for csv in downloads if csv.name.startswith(name) for row in read_table(csv)]
+    """Return the answers, and results beside the paper's."""
+    coverage, methods, beside = (
+        [row for csv in downloads if csv.stem == name for row in read_table(csv)]
         for name in _ANSWERING
     )
     titles = {case.name: case.title for case in study.cases.values()}
@@ -167,8 +167,7 @@ def _answered(study: Study, downloads: Sequence[Path]) -> dict[str, Any]:
             answers.say_what_the_study_gives(*asked, titles, who, study.optimum_tolerance),
             answers.say_which_method_finds_it(*asked),
         ],
-        "compared": answers.rows_beside_the_paper(beside, titles)
-        or answers.compared_rows(errors, verdicts, titles),
+        "compared": answers.rows_beside_the_paper(beside, titles),
     }
 
 
