@@ -40,7 +40,7 @@ def write_intervals(file: Path, rows: list[tuple[Any, ...]], quantities: Sequenc
     seeds = {row[2] for row in rows}
     given = {row[1:3] for row in rows}
     lacking = [one for one in product(quantities, seeds) if one not in given]
-    INTERVALS.write(file, [*rows, *((file.parent.name, *one, *[""] * 7) for one in lacking)])
+    INTERVALS.write(file, [*rows, *((file.parent.name, *one, *[""] * 6) for one in lacking)])
     return file
 
 
@@ -50,17 +50,17 @@ QUANTITIES = "k", "k_p", "c", "c_p", "c + c_p"
 def test_verdicts_are_counted_beside_intervals(tmp_path: Path) -> None:
     rows = [
         # Of k = 1 three intervals, two of which hold it; two seeds judged in full.
-        (CASE, "k", 0, 1.01, 0.9, 1.1, 1.0, "determined", 1.005, 1.2),
-        (CASE, "k", 1, 1.02, 0.9, 1.2, 1.01, "", "", ""),
-        (CASE, "k", 2, 1.3, 1.1, 1.5, 1.0, "bounded below", 0.95, ""),
+        (CASE, "k", 0, 1.01, 0.9, 1.1, "determined", 1.005, 1.2),
+        (CASE, "k", 1, 1.02, 0.9, 1.2, "", "", ""),
+        (CASE, "k", 2, 1.3, 1.1, 1.5, "bounded below", 0.95, ""),
         # c_p = 1e-3 is only judged in full.
-        (CASE, "c_p", 0, 0.1, "", "", "", "bounded above", "", 0.5),
-        (CASE, "c_p", 2, 0.1, "", "", "", "bounded above", "", 0.5e-3),
+        (CASE, "c_p", 0, "", "", "", "bounded above", "", 0.5),
+        (CASE, "c_p", 2, "", "", "", "bounded above", "", 0.5e-3),
         # k_p = 1e-4 is below the range that is searched, and the limit between the two.
-        (CASE, "k_p", 0, 0.1, "", "", "", "bounded above", "", 1.05e-4),
-        (CASE, "k_p", 2, 0.1, "", "", "", "not determined", "", ""),
+        (CASE, "k_p", 0, "", "", "", "bounded above", "", 1.05e-4),
+        (CASE, "k_p", 2, "", "", "", "not determined", "", ""),
     ]
-    untold = 0.1, "", "", "", "not determined", "", ""
+    untold = "", "", "", "not determined", "", ""
     rows += [(CASE, quantity, seed, *untold) for seed in (0, 2) for quantity in ("c", "c + c_p")]
     file = write_intervals(tmp_path / CASE / "seeds_0-2.csv", rows, QUANTITIES)
     every_other = study_of(OVERLAY.replace("0.9}", "0.9, verdicts_every: 2}"))
@@ -88,7 +88,7 @@ def test_verdicts_are_counted_beside_intervals(tmp_path: Path) -> None:
 
 
 def test_verdicts_of_every_seed_are_counted(tmp_path: Path) -> None:
-    empty = ("", "", "", "")
+    empty = ("", "", "")
     rows = [
         # Of k = 1 two intervals within a factor of 3, one of which holds it, and one that is wider.
         (CASE, "k", 0, *empty, "determined", 0.9, 1.1),
@@ -137,7 +137,7 @@ def test_the_bound_of_a_case_is_that_of_its_calibration(tmp_path: Path) -> None:
         arm = replace(study.gripper.left, stiffness_Nm_per_rad=stiffness[name])
         arms = {"left": arm, "right": arm}
         (tmp_path / f"{name}.yaml").write_text(calibration_yaml(arms, arms))
-        rows = [(name, "k", seed, 35.1, 34, 36, 35.2, "", "", "") for seed in (1, 2)]
+        rows = [(name, "k", seed, 35.1, 34, 36, "", "", "") for seed in (1, 2)]
         write_intervals(tmp_path / name / "seeds_1-2.csv", rows, ("k", "k_p", "c"))
         thought = step_response(replace(study.gripper, left=arm, right=arm), network)
         above, below = np.split(superpose(thought, TORQUE, case.times_s), 2)
@@ -216,7 +216,7 @@ def test_the_bound_of_a_case_is_of_its_own_calibration(tmp_path: Path) -> None:
         arms, known = ({"left": both, "right": both} for both in (stiff, arm))
         files[name].write_text(calibration_yaml(arms, known))
         batches.append(tmp_path / name / "seeds_0-1.csv")
-        rest = 1.0, 0.9, 1.1, 1.0, "determined", 0.9, 1.1
+        rest = 1.0, 0.9, 1.1, "determined", 0.9, 1.1
         seeds = [(name, q, seed, *rest) for seed in range(2) for q in QUANTITIES]
         INTERVALS.write(batches[-1], seeds)
     study = replace(study, calibrations=files)

@@ -119,7 +119,6 @@ _COVERAGE_COLUMNS = (
     Column("bound_percent", "Cramér-Rao bound, rest known %", 3),
     Column("spread_percent", "Spread %", 3),
     Column("spread_over_bound", "Spread / bound", 3),
-    Column("rest_known_over_bound", "The same, rest known", 3),
     Column("bias_percent", "Bias %", 2),
     Column("confidence_percent", "Confidence %", 4),
     Column("coverage_percent", "Intervals that hold the truth %", 3),
@@ -143,7 +142,7 @@ def coverage(study: Study, intervals: list[Path]) -> ShownTable:
         for quantity, percent in bounds_at_truth(case)
     }
     for case, head, estimated in _by_quantity(study, intervals):
-        fitted = estimated[estimated["estimate_rest_known"].notna()]
+        fitted = estimated[estimated["estimate"].notna()]
         shown = estimated[estimated["verdict"].notna()]
         if fitted.empty and not np.any(shown["verdict"] != NOT_DETERMINED):
             continue
@@ -156,8 +155,8 @@ def coverage(study: Study, intervals: list[Path]) -> ShownTable:
         "often the intervals hold the truth. The bound is for a simpler problem than that of the "
         "fits: parameters without information in the traces are fixed. Fits search these too; as "
         "they are near zero they can only be overestimated, at the expense of others: hence the "
-        "bias, and a spread above the bound. Rest known: the spread with these parameters at "
-        "their true values. On the right: verdicts from whole profiles, as users are shown them, "
+        "bias, and a spread above the bound. On the right: verdicts from whole profiles, as users "
+        "are shown them, "
         f"in {_judged_seeds(study)}, and how many of them are true; one-sided limits hold more "
         "often than the confidence says."
     )
@@ -204,16 +203,13 @@ def _spreads(fitted: pd.DataFrame, truth: float, bound: float, confidence: float
     """Return bound, spread and coverage of a quantity; nothing of one without intervals."""
     if fitted.empty:
         return {}
-    spread, rest_known = (
-        100 * float(np.std(np.log(fitted[name].to_numpy(float)), ddof=1))
-        for name in ("estimate", "estimate_rest_known")
-    )
+    errors = np.log(fitted["estimate"].to_numpy(float) / truth)
+    spread = 100 * float(np.std(errors, ddof=1))
     return {
         "bound_percent": bound,
         "spread_percent": spread,
         "spread_over_bound": spread / bound,
-        "rest_known_over_bound": rest_known / bound,
-        "bias_percent": np.mean(100 * np.log(fitted["estimate"].to_numpy(float) / truth)),
+        "bias_percent": np.mean(100 * errors),
         "confidence_percent": 100 * confidence,
         "coverage_percent": 100 * np.mean(_holds(fitted, truth)),
         "seeds": len(fitted),
