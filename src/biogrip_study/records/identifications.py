@@ -41,14 +41,14 @@ MODEL_FITS = RowFile(
 INTERVALS = RowFile(
     "intervals",
     (
-        *("case", "quantity", "seed", "estimate", "low", "high", "estimate_rest_known"),
+        *("case", "quantity", "seed", "estimate", "low", "high"),
         *("verdict", "shown_low", "shown_high"),
     ),
     words=("case", "quantity", "verdict"),
 )
-"""A row per quantity and seed. Quantities that traces should determine have an estimate, its
-limits, and the estimate with uninformed parameters fixed at their true values. For some seeds, all
-quantities also have the verdict and limits that users are shown, from whole profiles."""
+"""A row per quantity and seed. Quantities that traces should determine have an estimate and its
+limits. For some seeds, all quantities have the verdict and limits that users are shown, from whole
+profiles."""
 
 READING_FILE = RowFile(
     "readings",
