@@ -18,8 +18,7 @@ import numpy as np
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.fit.least_squares import LocalFits
 from biogrip.fit.levenberg_marquardt import Minima, Normal
-from biogrip.judging.likelihood import Likelihood
-from biogrip.judging.quantities import Quantity
+from biogrip.judging.likelihood import Likelihood, Quantity
 
 # E-folds from a bound at which a member counts as free, and by which rounding may exceed it.
 _FREE_OF_BOUND, _BEYOND_BOUND = 1e-9, 1e-7

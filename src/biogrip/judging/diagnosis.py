@@ -37,9 +37,14 @@ from biogrip.judging.doubts import (
     compute_status,
     examine_residuals,
 )
-from biogrip.judging.likelihood import Likelihood, check_rows, make_likelihood
-from biogrip.judging.quantities import characteristic_times, parameters_and_sum
-from biogrip.judging.verdicts import DETERMINED, Finding, Trade, compute_findings, find_trade_offs
+from biogrip.judging.likelihood import (
+    Likelihood,
+    characteristic_times,
+    check_rows,
+    make_likelihood,
+    parameters_and_sum,
+)
+from biogrip.judging.profiles import DETERMINED, Finding, Trade, compute_findings, find_trade_offs
 from biogrip.judging.what_moves import Move, find_moves
 from biogrip.judging.without_model import KINDS, WithoutModel, tell_without_model, times_told
 from biogrip.physics.sample_model import C_P
@@ -204,7 +209,7 @@ def lower_fit(judged: Diagnosis, fit: Fit) -> Fit | None:
 def profiled(likelihood: Likelihood, findings: list[Finding], trades: list[Trade]) -> Diagnosis:
     """Return a diagnosis without notes, with the lowest point of its profiles."""
     every = [*findings, *(trade.finding for trade in trades)]
-    lowest = min((finding.profile for finding in every), key=lambda p: float(p.increases.min()))
+    lowest = min(every, key=lambda finding: float(finding.increases.min()))
     missed = lowest.lowest if lowest.increases.min() < -levels.MISSED else None
     return Diagnosis(likelihood, findings, trades, lowest=missed)
 

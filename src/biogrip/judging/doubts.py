@@ -326,11 +326,6 @@ def _about_colour(left: _Left) -> Iterator[str]:
             f"Neighbouring residuals are correlated ({correlation:.2f}; white noise would give "
             f"0 ± {1 / np.sqrt(len(residual)):.2f}): the intervals are too narrow, or {suspects()}."
         )
-    elif (chance := whiteness.uneven(residual, basis)) < levels.FALSE_ALARM:
-        yield (
-            "The residual has more of some frequencies than of others, unlike white noise "
-            f"({p_value(chance)}): the intervals are wrong, or {suspects()}."
-        )
     chance = whiteness.wandering(residual, basis)
     if chance < levels.FALSE_ALARM:
         yield (
@@ -376,8 +371,8 @@ def _about_changes(left: _Left, *, coloured: bool) -> list[str]:
 def _is_coloured(step: whiteness.Step) -> bool:
     """Return True if what a fit leaves with a step is not white noise, either."""
     given = step.left, step.basis
-    chances = whiteness.correlated(*given)[1], whiteness.uneven(*given), whiteness.wandering(*given)
-    return min(chances) < levels.FALSE_ALARM
+    chance = min(whiteness.correlated(*given)[1], whiteness.wandering(*given))
+    return chance < levels.FALSE_ALARM
 
 
 def middle_of(residuals: Residuals) -> int:

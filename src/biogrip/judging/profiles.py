@@ -1,4 +1,9 @@
-"""Profile likelihood: minimum of chi^2 over all parameters against one quantity [1]_, [2]_.
+"""Profile likelihoods, limits, and verdicts: determined, bounded on one side, or not determined.
+
+A profile is the minimum of chi^2 over all parameters against one quantity [1]_, [2]_. It has a
+limit on a side if it exceeds `Likelihood.certainty` (99.9 %) at that end of the search range; the
+limit is where it crosses `Likelihood.threshold` (95 %, or the confidence asked for). The verdict is
+which of the two limits there are; `Finding.words` has the words of each.
 
 All quantities of many traces are profiled at once, over their whole search ranges. All points are
 fitted from the optimum, then from the fits of both neighbours, again and again where these have
@@ -16,21 +21,155 @@ References
 .. [3] M. Dowell and P. Jarratt, BIT 11 (1971), 168-174.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 import numpy as np
 
 import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray, IntArray
+from biogrip.digits import plain, with_limits, within_limits
 from biogrip.fit.least_squares import FAIR, FINE, alike
 from biogrip.judging.constrained_fits import CLOSE, ConstrainedFits
-from biogrip.judging.likelihood import Likelihood
-from biogrip.judging.quantities import Quantity
+from biogrip.judging.likelihood import Likelihood, Quantity, find_combinations
 
 HIGHEST = 16.0
 """Increase of chi^2 up to which a profile has dense points, as figures show no more."""
+
+DETERMINED = "determined"
+BOUNDED_BELOW = "bounded below"
+BOUNDED_ABOVE = "bounded above"
+NOT_DETERMINED = "not determined"
+FIT_REJECTED = "fit rejected"
+"""Verdict on every quantity of a fit that is rejected."""
+
+
+def verdict_of(low: float | None, high: float | None) -> str:
+    """Return the verdict on a quantity with these limits."""
+    if low is None:
+        return NOT_DETERMINED if high is None else BOUNDED_ABOVE
+    return BOUNDED_BELOW if high is None else DETERMINED
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A quantity, the profile of its logarithm, its limits, and the verdict on it."""
+
+    quantity: Quantity
+    log_values: Array
+    """Ascending logarithms, (n_points,)."""
+    increases: Array
+    """Increase of chi^2 at each, (n_points,)."""
+    log_best: float
+    """Logarithm at the optimum."""
+    log_low: float | None
+    """Lower confidence limit; None where the trace sets none."""
+    log_high: float | None
+    """Upper confidence limit, likewise."""
+    lowest: Array
+    """Log-parameters of the lowest increase, negative if the optimum was missed."""
+    deviation: float
+    """Standard deviation of its logarithm to first order, see `Likelihood.deviation`."""
+    log_gaps: tuple[tuple[float, float], ...] = ()
+    """Stretches between the limits in which the profile is above the threshold."""
+    slowest_s: float | None = None
+    """Relaxation time of a branch of the best fit that denies limits, as it should be within the
+    trace."""
+
+    @property
+    def verdict(self) -> str:
+        """Verdict: determined, bounded below or above, or not determined."""
+        return verdict_of(self.log_low, self.log_high)
+
+    @property
+    def value(self) -> float:
+        """Best estimate in SI units, meaningful only if the quantity is determined."""
+        return math.exp(self.log_best)
+
+    @property
+    def low(self) -> float | None:
+        """Lower confidence limit in SI units."""
+        return None if self.log_low is None else math.exp(self.log_low)
+
+    @property
+    def high(self) -> float | None:
+        """Upper confidence limit in SI units."""
+        return None if self.log_high is None else math.exp(self.log_high)
+
+    @property
+    def gaps(self) -> list[tuple[float, float]]:
+        """Stretches between the limits that are excluded, in SI units."""
+        return [(math.exp(start), math.exp(end)) for start, end in self.log_gaps]
+
+    @property
+    def is_bounded(self) -> bool:
+        """True if the trace bounds the quantity on at least one side."""
+        return self.verdict != NOT_DETERMINED
+
+    @property
+    def is_wide(self) -> bool:
+        """True if its two limits tell little more than an order of magnitude: see `WIDE`."""
+        low, high = self.low, self.high
+        return low is not None and high is not None and high > levels.WIDE**2 * low
+
+    def allows(self, log_parameters: Array) -> bool:
+        """Return True if parameters, (n_parameters,), lie within the limits; NaN does."""
+        value = self.quantity.log(log_parameters)
+        low, high = self.log_low, self.log_high
+        beyond = (low is not None and value < low) or (high is not None and value > high)
+        return not (beyond or any(start < value < end for start, end in self.log_gaps))
+
+    def words(self) -> str:
+        """Return the verdict in words, e.g. ``determined: 34.1 N/m (31.2 to 37.3)``."""
+        words, unit = self._limits_in_words(), self._unit
+        if self.gaps:
+            ends = (end for gap in self.gaps for end in gap)
+            gaps = within_limits(self.value, self.low or 0.0, self.high or 0.0, *ends)[3:]
+            but = " and ".join(map(" to ".join, zip(gaps[::2], gaps[1::2], strict=True)))
+            words += f", except {but}{unit}"
+        if self.quantity.provided and self.is_bounded:
+            words += f", provided {self.quantity.provided}"
+        return words
+
+    def _limits_in_words(self) -> str:
+        low, high, unit = self.low, self.high, self._unit
+        if low is not None and high is not None:
+            decades = plain(math.log10(high / low), 2)
+            how = f" only to {decades} decades" if self.is_wide else ""
+            return f"determined{how}: {with_limits(self.value, low, high, self.quantity.unit)}"
+        if low is not None:
+            return f"only bounded below: at least {plain(low, 2)}{unit}"
+        if high is not None:
+            return f"only bounded above: at most {plain(high, 2)}{unit}"
+        if self.slowest_s is not None:
+            slowest = f"a branch of the best fit relaxes in {plain(self.slowest_s, 2)} s,"
+            return f"not stated: {slowest} longer than the trace lasts"
+        return "not determined: the trace sets no limit within the search range"
+
+    @property
+    def _unit(self) -> str:
+        return f" {self.quantity.unit}" if self.quantity.unit else ""
+
+
+@dataclass(frozen=True)
+class Trade:
+    """Parameters of which only a combination is determined."""
+
+    members: tuple[str, ...]
+    """Names of parameters that trade against each other."""
+    finding: Finding
+    """The combination that is determined."""
+
+    def words(self) -> str:
+        """Return the trade as a sentence."""
+        names = " and ".join(self.members)
+        what = self.finding.words().partition(": ")[2]
+        return (
+            f"{names} trade against each other; determined is {self.finding.quantity.label}: {what}"
+        )
+
 
 # Largest difference between neighbours of the square root of the increase, which is nearly linear.
 _ROOT_STEP = 0.3
@@ -133,15 +272,12 @@ def keep_lower(
     increases: Array, x: Array, point: IntArray, fitted_increases: Array, fitted: Array
 ) -> BoolArray:
     """Keep lower fits of points, one or more each, in place; return which improved much."""
-    news = np.zeros(len(increases), dtype=bool)
-    for at, increase, parameters in zip(
-        point.tolist(), fitted_increases.tolist(), fitted, strict=True
-    ):
-        before = increases[at]
-        if increase < before:
-            news[at] |= increase < before - _LEAST_IMPROVEMENT * (1 + abs(increase))
-            increases[at], x[at] = increase, parameters
-    return news
+    before = increases.copy()
+    # Of several fits of a point the lowest comes last, and stays.
+    order = np.argsort(-fitted_increases, kind="stable")
+    lower = order[fitted_increases[order] < before[point[order]]]
+    increases[point[lower]], x[point[lower]] = fitted_increases[lower], fitted[lower]
+    return increases < before - _LEAST_IMPROVEMENT * (1 + np.abs(increases))
 
 
 # Points near the best fit, in standard deviations, that every profile has.
@@ -152,91 +288,57 @@ _LEAST_GAP_OF_POINTS = 1e-9
 _ROOT_ERROR = 1e-5
 
 
-@dataclass(frozen=True)
-class Profile:
-    """A profile and its confidence limits, as logarithms of the quantity."""
-
-    log_values: Array
-    """Ascending values, (n_points,)."""
-    increases: Array
-    """Increase of chi^2 at each, (n_points,)."""
-    best: float
-    """Value at the optimum."""
-    low: float | None
-    """Lower confidence limit; None where the trace sets none."""
-    high: float | None
-    """Upper confidence limit, likewise."""
-    lowest: Array
-    """Log-parameters of the lowest increase, negative if the optimum was missed."""
-    gaps: tuple[tuple[float, float], ...] = ()
-    """Stretches between the limits in which the profile is above the threshold."""
-    certainty: float | None = None
-    """Increase that a limit takes at an end of the range, if an end is above the threshold and yet
-    has no limit for want of it; else None."""
-    slowest_s: float | None = None
-    """Relaxation time of a branch of the best fit that denies limits, as it should be within the
-    trace."""
-
-
-def compute_profiles(
+def compute_findings(
     likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity], *, smooth: bool = True
-) -> list[list[Profile]]:
-    """Compute profiles and limits by trace and quantity, with points for a drawing if `smooth`."""
-    by_trace: dict[int, list[Profile]] = {}
+) -> list[list[Finding]]:
+    """Profile quantities in each of several traces, and reach a verdict on each of them.
+
+    Profiles have points for a drawing if `smooth`.
+    """
+    by_trace: dict[int, list[Finding]] = {}
     count = len(quantities)
     for group in alike([likelihood.problem for likelihood in likelihoods]):
         fits = ConstrainedFits([likelihoods[index] for index in group], quantities)
-        profiles = _profiles(fits, smooth=smooth)
+        findings = _findings(fits, smooth=smooth)
         for place, index in enumerate(group.tolist()):
-            by_trace[index] = profiles[place * count : (place + 1) * count]
+            by_trace[index] = findings[place * count : (place + 1) * count]
     return [by_trace[index] for index in range(len(likelihoods))]
 
 
-def _profiles(fits: ConstrainedFits, *, smooth: bool) -> list[Profile]:
-    grids = [
-        _grid_of(likelihood, quantity)
-        for likelihood in fits.likelihoods
-        for quantity in fits.quantities
-    ]
-    points = Points(fits, grids)
+def _findings(fits: ConstrainedFits, *, smooth: bool) -> list[Finding]:
+    pairs = [(one, quantity) for one in fits.likelihoods for quantity in fits.quantities]
+    deviations = [likelihood.deviation(quantity) for likelihood, quantity in pairs]
+    of_grids = zip(pairs, deviations, strict=True)
+    points = Points(fits, [_grid_of(*pair, deviation) for pair, deviation in of_grids])
     points.from_optimum()
     points.from_neighbours()
     limits = _find_crossings(points).T
     if smooth:
         points.smooth(limits)
-    profiles = []
-    for index, ends in enumerate(limits.tolist()):
-        in_profile = points.profile == index
-        values, increases, x = (
-            points.values[in_profile],
-            points.increases[in_profile],
-            points.x[in_profile],
-        )
-        gaps = find_gaps(values, increases, float(fits.threshold[index]))
-        lowest = x[int(np.argmin(increases))]
-        short = (increases[[0, -1]] > fits.threshold[index]) & np.isnan(ends)
-        certainty = float(fits.certainty[index]) if np.any(short) else None
-        best = float(fits.at_best[index])
-        slowest_s = fits.slowest(index)
-        if np.min(increases[values != best], initial=np.inf) <= fits.threshold[index]:
-            slowest_s = None
-        problem = fits.likelihoods[fits.trace[index]].problem
-        quantity = fits.quantities[index % len(fits.quantities)]
-        made = values[quantity.at_end(x, problem.low, problem.high, values > best)]
+    findings = []
+    for index, (likelihood, quantity) in enumerate(pairs):
+        of = points.profile == index
+        values, increases, x = points.values[of], points.increases[of], points.x[of]
+        best, threshold = float(fits.at_best[index]), float(fits.threshold[index])
+        gaps, slowest_s = find_gaps(values, increases, threshold), fits.slowest(index)
+        above = values > best
+        made = values[quantity.at_end(x, likelihood.problem.low, likelihood.problem.high, above)]
+        ends = limits[index].tolist()
         low, high = (None if np.isnan(end) or end in made else end for end in ends)
+        if np.min(increases[values != best], initial=np.inf) <= threshold:
+            slowest_s = None
         if slowest_s is not None:
-            low, high, gaps, certainty = None, None, (), None
-        profiles.append(
-            Profile(values, increases, best, low, high, lowest, gaps, certainty, slowest_s)
-        )
-    return profiles
+            low, high, gaps = None, None, ()
+        shown = quantity, values, increases, best, low, high, x[int(np.argmin(increases))]
+        findings.append(Finding(*shown, deviations[index], gaps, slowest_s))
+    return findings
 
 
-def _grid_of(likelihood: Likelihood, quantity: Quantity) -> Array:
+def _grid_of(likelihood: Likelihood, quantity: Quantity, deviation: float) -> Array:
     """Return ascending values over a quantity's whole range, denser near the optimum."""
     low, high = quantity.range(likelihood.problem.low, likelihood.problem.high)
     start = quantity.log(likelihood.best)
-    near = start + likelihood.deviation(quantity) * _NEAR_OPTIMUM
+    near = start + deviation * _NEAR_OPTIMUM
     others = np.concatenate((near[(near > low) & (near < high)], np.linspace(low, high, _EVENLY)))
     # Rounding must not make two points of an optimum that lies at an end.
     return np.unique(np.append(others[np.abs(others - start) > _LEAST_GAP_OF_POINTS], start))
@@ -383,3 +485,33 @@ def find_gaps(
             first, last = (np.interp(np.sqrt(threshold), roots[of], log_values[of]) for of in sides)
             gaps.append((float(first), float(last)))
     return tuple(gaps)
+
+
+def find_trade_offs(likelihood: Likelihood, findings: Sequence[Finding]) -> list[Trade]:
+    """Find determined combinations of undetermined parameters.
+
+    Combinations among the findings come first. Of other pairs, the combination known best to first
+    order is profiled, if it is worth a look.
+    """
+    model, trades = likelihood.problem.residuals.model, list[tuple[tuple[int, ...], Finding]]()
+    left = [
+        finding.quantity.members[0]
+        for finding in findings
+        if len(finding.quantity.members) == 1 and finding.verdict != DETERMINED
+    ]
+    for finding in findings:
+        members = tuple(index for index in finding.quantity.members if index in left)
+        if len(members) > 1:
+            trades.append((members, finding))
+            left = [index for index in left if index not in members]
+    for pair in combinations(left, 2):
+        candidates = find_combinations(model, list(pair))
+        best = min(candidates, key=likelihood.deviation, default=None)
+        if best is not None and likelihood.deviation(best) < levels.WORTH_A_PROFILE:
+            ((finding,),) = compute_findings([likelihood], [best])
+            trades.append((pair, finding))
+    return [
+        Trade(tuple(model.parameters[index].name for index in members), finding)
+        for members, finding in trades
+        if finding.verdict == DETERMINED
+    ]

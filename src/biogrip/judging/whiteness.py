@@ -19,7 +19,6 @@ basis of what the fit absorbs has orthonormal rows, (n_directions, n_samples), s
 References
 ----------
 .. [1] J. Durbin and G. S. Watson, Biometrika 38 (1951), 159-177: section 4.
-.. [2] J. Durbin, Biometrika 56 (1969), 1-15: the cumulative periodogram.
 .. [3] R. D. Cook and S. Weisberg, Residuals and Influence in Regression, 1982: section 2.2.2.
 .. [4] H. D. Patterson and R. Thompson, Biometrika 58 (1971), 545-554: restricted likelihood.
 .. [5] F. E. Satterthwaite, Biometrics Bulletin 2 (1946), 110-114.
@@ -124,30 +123,6 @@ def _chance_of_less(observed: float, first: float, second: float, free: int, mos
     weight = share * (1 - share) / (variance / most**2) - 1
     chance = betainc(share * weight, (1 - share) * weight, min(max(observed / most, 0.0), 1.0))
     return float(chance)
-
-
-def uneven(residual: Array, basis: Array) -> float:
-    """Return the p-value of the cumulative periodogram test of white noise [2]_.
-
-    The statistic is the largest distance between the cumulative periodogram and that of what the
-    fit leaves of white noise, with Kolmogorov's distribution. The test detects noise with a
-    correlation time of some readings and too small a share to correlate neighbours.
-    """
-    from scipy.fft import prev_fast_len
-    from scipy.special import kolmogorov
-
-    # A transform takes many times the memory if its length has no small factors.
-    n = prev_fast_len(len(residual))
-    places = slice(1, (n + 1) // 2)
-    power = np.abs(np.fft.rfft(residual[:n])[places]) ** 2
-    if len(power) < 2:
-        return 1.0
-    expected = np.full(len(power), float(n))
-    for row in basis:
-        expected -= np.abs(np.fft.rfft(row[:n])[places]) ** 2
-    reached = np.cumsum(power)[:-1] / np.sum(power)
-    shares = np.cumsum(expected)[:-1] / np.sum(expected)
-    return float(kolmogorov(np.sqrt(len(power)) * np.max(np.abs(reached - shares))))
 
 
 def find_line(residual: Array, time_s: Array) -> tuple[float, float, Array]:
@@ -416,8 +391,7 @@ def about_moduli(
 ) -> Iterator[str]:
     """Yield a sentence for each test that residuals over the growth of the noise fail.
 
-    The tests are for inertia; for moduli that differ, if each is fitted by itself; and for one that
-    scatters more than the other for its weights, by an F test.
+    The tests are for inertia, and for moduli that differ if each is fitted by itself.
     """
     storage = is_storage(residuals.trace.time_s)
     is_inertia, cause = find_inertia(residuals, residual, basis, growth)
@@ -428,18 +402,4 @@ def about_moduli(
         yield (
             "The storage and the loss modulus, each fitted by itself, differ by more than white "
             f"noise ({p_value(chance)}): {cause}."
-        )
-    if residuals.freedom < np.inf:
-        # Their weights are how they scatter.
-        return
-    columns = storage, ~storage
-    free = [float(np.sum(of) - np.sum(basis[:, of] ** 2)) for of in columns]
-    means = [float(np.sum(residual[of] ** 2)) / n for of, n in zip(columns, free, strict=True)]
-    larger = int(means[1] > means[0])
-    ratio = means[larger] / means[1 - larger]
-    if 2 * fdtrc(free[larger], free[1 - larger], ratio) < levels.FALSE_ALARM:
-        yield (
-            f"For its weights the {('storage', 'loss')[larger]} modulus scatters "
-            f"{plain(np.sqrt(ratio), 2)} times as much as the other: give standard deviations of "
-            "both (--sd, --set measurement.loss_sd=COLUMN)."
         )

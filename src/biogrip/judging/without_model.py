@@ -38,7 +38,7 @@ import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray
 from biogrip.digits import plain, with_limits
 from biogrip.fit.any_sample import AnySampleFit, Lags, count_lags, fit_any_sample
-from biogrip.judging.verdicts import verdict_of
+from biogrip.judging.profiles import verdict_of
 from biogrip.judging.what_moves import Move, as_moves, find_mistakes
 from biogrip.judging.whiteness import as_correlated, correlated
 from biogrip.physics.residuals import Residuals

@@ -15,8 +15,8 @@ import biogrip_study.records.identifications as records
 from biogrip.arrays import Array
 from biogrip.digits import with_unit
 from biogrip.figures import style
-from biogrip.judging.quantities import parameters_and_sum, quantity_value
-from biogrip.judging.verdicts import DETERMINED
+from biogrip.judging.likelihood import parameters_and_sum, quantity_value
+from biogrip.judging.profiles import DETERMINED
 from biogrip_study.config.study import Case
 from biogrip_study.figures.case_fit import SHOWN_SEEDS, draw_runs, first_of_basins, seeds_in_words
 from biogrip_study.methods.registry import METHODS

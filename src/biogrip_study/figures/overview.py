@@ -15,8 +15,8 @@ from biogrip.digits import with_unit
 from biogrip.figures import style
 from biogrip.figures.fit import draw_traces
 from biogrip.figures.likelihood import draw_profile
-from biogrip.judging.quantities import parameters_and_sum, quantity_value
-from biogrip.judging.verdicts import BOUNDED_ABOVE
+from biogrip.judging.likelihood import parameters_and_sum, quantity_value
+from biogrip.judging.profiles import BOUNDED_ABOVE
 from biogrip.physics.noise import standard_deviation
 from biogrip.physics.sample_model import Network, complex_modulus
 from biogrip_study.config.study import Case, Study

@@ -7,7 +7,7 @@ from typing import Any
 from biogrip.digits import legible, plain, with_unit
 from biogrip.fit.nested_fits import FittedModel, advice, fits_far_better, preferred
 from biogrip.judging.doubts import DOUBTFUL, OK, REJECTED
-from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
+from biogrip.judging.profiles import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
 from biogrip.physics.models import CANDIDATES
 from biogrip_study.records.identifications import ALL
 

@@ -27,9 +27,8 @@ from biogrip.fit.trace_fit import TraceFit, fit_least_squares
 from biogrip.identify.data import judged_data
 from biogrip.identify.identify import identify_alike
 from biogrip.judging.diagnosis import Diagnosis, diagnose, profiled, settled
-from biogrip.judging.likelihood import Likelihood, covariance
-from biogrip.judging.quantities import Quantity, parameters_and_sum
-from biogrip.judging.verdicts import DETERMINED, Finding, compute_findings
+from biogrip.judging.likelihood import Likelihood, Quantity, covariance, parameters_and_sum
+from biogrip.judging.profiles import DETERMINED, Finding, compute_findings
 from biogrip.physics.noise import add_noise, rms, standard_deviation
 from biogrip.physics.sample_model import SampleModel, with_fixed
 from biogrip.records import write_object
@@ -206,7 +205,7 @@ def _estimates(
     logs, digits = [quantity.log(best), None, None, None], _ESTIMATE_DIGITS
     if with_limits is not None:
         finding, known = with_limits
-        low, high = finding.profile.low, finding.profile.high
+        low, high = finding.log_low, finding.log_high
         logs[1:] = low, high, quantity.log(known)
         narrow = low is not None and high is not None and high - low < _NARROW
         digits = _MORE_DIGITS if narrow else _ESTIMATE_DIGITS

@@ -14,8 +14,7 @@ import pandas as pd
 
 import biogrip_study.records.identifications as records
 from biogrip.arrays import BoolArray
-from biogrip.judging.likelihood import bounds_percent, headlines
-from biogrip.judging.quantities import Quantity, quantity_value
+from biogrip.judging.likelihood import Quantity, bounds_percent, headlines, quantity_value
 from biogrip.physics.noise import rms
 from biogrip.physics.simulation import simulated_response
 from biogrip_study.config.study import Case, Study
