@@ -129,10 +129,8 @@ def test_profiles_are_as_low_as_fits_with_the_parameter_known(case: str) -> None
         ends = likelihood.problem.low[index], likelihood.problem.high[index]
         np.testing.assert_allclose(found.log_values[[0, -1]], ends)
         assert np.min(found.increases) > -1e-3
-        # Points are close enough for a curve, and at the limits, where it crosses the threshold.
+        # The curve passes the limits, where it crosses the threshold.
         assert {found.log_low, found.log_high} - {None} <= {*found.log_values}
-        shown = np.sqrt(np.clip(found.increases, 0.0, 16.0))
-        assert np.max(np.abs(np.diff(shown))) <= 0.3
         for value, increase in zip(found.log_values[::12], found.increases[::12], strict=True):
             alone = rise_of_held(likelihood, quantity, value, likelihood.best)
             assert increase < alone + 1e-3 * (1 + alone)
@@ -217,8 +215,8 @@ def test_a_limit_is_in_the_deepest_basin_that_any_profile_knows() -> None:
     """Not where the first is left, at -2 and 2: at the jump at 3, and nowhere."""
     points = Points(TwoBasins(), [np.linspace(-5.0, 5.0, 11)] * 2)  # type: ignore[arg-type]
     points.from_optimum()
-    points.from_neighbours(points.profile == 0)
-    assert _find_crossings(points)[:, 0] == pytest.approx([np.nan, 3.0], abs=1e-6, nan_ok=True)
+    points.from_neighbours()
+    assert _find_crossings(points)[0][:, 0] == pytest.approx([np.nan, 3.0], abs=1e-6, nan_ok=True)
 
 
 def test_an_optimum_that_was_missed_is_judged_again() -> None:
@@ -302,11 +300,11 @@ def test_what_is_hardly_worse_at_the_end_of_the_range_has_no_limit() -> None:
     """A profile that ends between 95 and 99.9 %, or below, sets none."""
     likelihood = likelihood_of(problem("liquid_drop_1", 0, rate_Hz=10.0))
     k = QUANTITIES[:1]
-    ((plain,),) = compute_findings([likelihood], k, smooth=False)
+    ((plain,),) = compute_findings([likelihood], k)
     rise = max(plain.increases[[0, -1]])
     for wanted in (2.0, 7.0):
         noise_sd = likelihood.noise_sd * np.sqrt(rise / wanted)
-        ((found,),) = compute_findings([replace(likelihood, noise_sd=noise_sd)], k, smooth=False)
+        ((found,),) = compute_findings([replace(likelihood, noise_sd=noise_sd)], k)
         assert (found.low, found.high) == (None, None)
         assert max(found.increases[[0, -1]]) == pytest.approx(wanted, rel=0.05)
         assert found.words() == "not determined: the trace sets no limit within the search range"

@@ -471,7 +471,7 @@ def profile_over_onset(diagnosis: Diagnosis, time_s: Array) -> Diagnosis:
     if not others:
         return diagnosis
     found = [*diagnosis.findings, *(trade.finding for trade in diagnosis.trades)]
-    every = compute_findings(others, [finding.quantity for finding in found], smooth=False)
+    every = compute_findings(others, [finding.quantity for finding in found])
     costs = [best.threshold - other.threshold for other in others]
     at_ends = [_at(best, end_s).best for end_s in ends]
     merged = [
@@ -524,7 +524,7 @@ def _merged(
     every = [finding, *of_others]
     values: Array = np.unique(np.concatenate([one.log_values for one in every]))
     rows = [
-        np.interp(values, one.log_values, one.increases + cost)
+        np.interp(values, one.log_values, np.sqrt(np.maximum(one.increases, 0.0))) ** 2 + cost
         for one, cost in zip(every, (0.0, *costs), strict=True)
     ]
     lows = [one.log_low for one in every if one.log_low is not None]

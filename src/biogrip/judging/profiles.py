@@ -35,9 +35,6 @@ from biogrip.fit.least_squares import FAIR, FINE, alike
 from biogrip.judging.constrained_fits import CLOSE, ConstrainedFits
 from biogrip.judging.likelihood import Likelihood, Quantity, find_combinations
 
-HIGHEST = 16.0
-"""Increase of chi^2 up to which a profile has dense points, as figures show no more."""
-
 DETERMINED = "determined"
 BOUNDED_BELOW = "bounded below"
 BOUNDED_ABOVE = "bounded above"
@@ -171,9 +168,6 @@ class Trade:
         )
 
 
-# Largest difference between neighbours of the square root of the increase, which is nearly linear.
-_ROOT_STEP = 0.3
-_MOST_HALVINGS = 8
 # Improvement of a fit, relative to 1 + increase of chi^2, that has its neighbours fitted again.
 _LEAST_IMPROVEMENT = 1e-3
 
@@ -199,11 +193,11 @@ class Points:
         point = np.flatnonzero(~self._optimum)
         self._try(point, point, FAIR)
 
-    def from_neighbours(self, news: BoolArray | None = None) -> None:
-        """Fit points from their neighbours' fits, of all or of some, as long as these improve."""
+    def from_neighbours(self) -> None:
+        """Fit points from their neighbours' fits as long as these improve."""
         # Optima, and places beyond the ends, belong to no profile here: they are not fitted.
         to_fit = np.append(np.where(self._optimum, -1, self.profile), -1)
-        news = np.full(len(self.values), True) if news is None else news
+        news = np.full(len(self.values), True)
         while np.any(news):
             start = np.tile(np.flatnonzero(news), 2)
             point = start + np.repeat((-1, 1), len(start) // 2)
@@ -227,46 +221,6 @@ class Points:
         ends = self.x[self.ends()].reshape(2, len(self.fits.likelihoods), -1, self.x.shape[1])
         return np.concatenate(ends.swapaxes(1, 2))
 
-    def smooth(self, limits: Array) -> None:
-        """Add limits, (n_profiles, 2) or NaN, and midpoints of neighbours far apart in drawings."""
-        profile, side = np.nonzero(np.isfinite(limits))
-        values = limits[profile, side]
-        below = (self.profile == profile[:, None]) & (self.values < values[:, None])
-        left = self.ends()[0, profile] + np.sum(below, axis=1) - 1
-        new = self.values[left + 1] != values
-        self._add(left[new], values[new])
-        self._deepen(np.flatnonzero(np.isin(self.values, values[new])))
-        for _ in range(_MOST_HALVINGS):
-            roots = np.sqrt(np.clip(self.increases, 0.0, HIGHEST))
-            left = np.flatnonzero(
-                (np.abs(np.diff(roots)) > _ROOT_STEP) & (np.diff(self.profile) == 0)
-            )
-            self._add(left, 0.5 * (self.values[left] + self.values[left + 1]))
-
-    def _deepen(self, limits: IntArray) -> None:
-        """Fit limits above the threshold from the ends of all profiles, and their neighbours."""
-        profile = self.profile[limits]
-        missed = self.increases[limits] > levels.GAP * self.fits.threshold[profile]
-        limits, profile = limits[missed], profile[missed]
-        if not len(limits):
-            return
-        starts = self.extremes()[:, self.fits.trace[profile]]
-        increases, x = self.fits.from_each(profile, self.values[limits], starts, CLOSE)
-        self.increases[limits], self.x[limits] = np.min(increases, axis=0), x
-        self.from_neighbours(np.isin(np.arange(len(self.values)), limits))
-
-    def _add(self, left: IntArray, values: Array) -> None:
-        """Insert points after given ones, each with the lower of the fits from both neighbours."""
-        if not len(left):
-            return
-        profile, right = self.profile[left], left + 1
-        increases, x = self.fits.from_each(profile, values, self.x[np.stack((left, right))], CLOSE)
-        self.profile = np.insert(self.profile, right, profile)
-        self.values = np.insert(self.values, right, values)
-        self._optimum = np.insert(self._optimum, right, False)
-        self.increases = np.insert(self.increases, right, np.min(increases, axis=0))
-        self.x = np.insert(self.x, right, x, axis=0)
-
 
 def keep_lower(
     increases: Array, x: Array, point: IntArray, fitted_increases: Array, fitted: Array
@@ -289,47 +243,45 @@ _ROOT_ERROR = 1e-5
 
 
 def compute_findings(
-    likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity], *, smooth: bool = True
+    likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity]
 ) -> list[list[Finding]]:
-    """Profile quantities in each of several traces, and reach a verdict on each of them.
-
-    Profiles have points for a drawing if `smooth`.
-    """
+    """Profile quantities in each of several traces, and reach a verdict on each of them."""
     by_trace: dict[int, list[Finding]] = {}
     count = len(quantities)
     for group in alike([likelihood.problem for likelihood in likelihoods]):
         fits = ConstrainedFits([likelihoods[index] for index in group], quantities)
-        findings = _findings(fits, smooth=smooth)
+        findings = _findings(fits)
         for place, index in enumerate(group.tolist()):
             by_trace[index] = findings[place * count : (place + 1) * count]
     return [by_trace[index] for index in range(len(likelihoods))]
 
 
-def _findings(fits: ConstrainedFits, *, smooth: bool) -> list[Finding]:
+def _findings(fits: ConstrainedFits) -> list[Finding]:
     pairs = [(one, quantity) for one in fits.likelihoods for quantity in fits.quantities]
     deviations = [likelihood.deviation(quantity) for likelihood, quantity in pairs]
     of_grids = zip(pairs, deviations, strict=True)
     points = Points(fits, [_grid_of(*pair, deviation) for pair, deviation in of_grids])
     points.from_optimum()
     points.from_neighbours()
-    limits = _find_crossings(points).T
-    if smooth:
-        points.smooth(limits)
+    limits, at_limits = _find_crossings(points)
     findings = []
     for index, (likelihood, quantity) in enumerate(pairs):
         of = points.profile == index
         values, increases, x = points.values[of], points.increases[of], points.x[of]
         best, threshold = float(fits.at_best[index]), float(fits.threshold[index])
-        gaps, slowest_s = find_gaps(values, increases, threshold), fits.slowest(index)
-        above = values > best
-        made = values[quantity.at_end(x, likelihood.problem.low, likelihood.problem.high, above)]
-        ends = limits[index].tolist()
-        low, high = (None if np.isnan(end) or end in made else end for end in ends)
+        slowest_s, ends = fits.slowest(index), limits[:, index]
         if np.min(increases[values != best], initial=np.inf) <= threshold:
             slowest_s = None
-        if slowest_s is not None:
-            low, high, gaps = None, None, ()
-        shown = quantity, values, increases, best, low, high, x[int(np.argmin(increases))]
+        # Limits that the ends of search ranges make are none.
+        ranges, above = (likelihood.problem.low, likelihood.problem.high), np.array([False, True])
+        ends = np.where(quantity.at_end(at_limits[:, index], *ranges, above), np.nan, ends)
+        told = ends[np.isfinite(ends)] if slowest_s is None else ends[:0]
+        low, high = (float(end) if end in told else None for end in ends)
+        lowest, increases = x[int(np.argmin(increases))], np.append(increases, threshold + 0 * told)
+        values = np.append(values, told)
+        order = np.argsort(values, kind="stable")
+        shown = quantity, values[order], increases[order], best, low, high, lowest
+        gaps = find_gaps(*shown[1:3], threshold) if slowest_s is None else ()
         findings.append(Finding(*shown, deviations[index], gaps, slowest_s))
     return findings
 
@@ -344,10 +296,13 @@ def _grid_of(likelihood: Likelihood, quantity: Quantity, deviation: float) -> Ar
     return np.unique(np.append(others[np.abs(others - start) > _LEAST_GAP_OF_POINTS], start))
 
 
-def _find_crossings(points: Points) -> Array:
-    """Find the limits, where profiles cross the threshold, (2, n_profiles); NaN without limit."""
+def _find_crossings(points: Points) -> tuple[Array, Array]:
+    """Find the limits, where profiles cross the threshold, (2, n_profiles); NaN without limit.
+
+    Returns their fits, too, (2, n_profiles, n_parameters).
+    """
     fits, ends = points.fits, points.ends()
-    crossed = np.full(ends.shape, np.nan)
+    crossed, at_crossings = np.full(ends.shape, np.nan), fits.best[np.zeros_like(ends)]
     end, profile = np.nonzero(points.increases[ends] > fits.certainty)
     while len(profile):
         below = np.flatnonzero(points.increases < fits.threshold[points.profile])
@@ -361,13 +316,13 @@ def _find_crossings(points: Points) -> Array:
         both = np.stack((inside, outside))
         values, increases, x = points.values[both], points.increases[both], points.x[both]
         elsewhere = points.extremes()[:, fits.trace[profile]]
-        limits = crossings(fits, profile, values, increases, x, elsewhere)
-        crossed[end, profile] = limits
+        limits, fitted = crossings(fits, profile, values, increases, x, elsewhere)
+        crossed[end, profile], at_crossings[end, profile] = limits, fitted
         points.increases[both], points.x[both] = increases, x
         # Where the outer point has come below the threshold, the next bracket is further out.
         on = np.isnan(limits) & (outside != ends[end, profile])
         end, profile = end[on], profile[on]
-    return crossed
+    return crossed, at_crossings
 
 
 # Most fits for a crossing, and the width of an interval in which a profile jumps.
@@ -421,7 +376,7 @@ def crossings(
     increases: Array,
     x: Array,
     elsewhere: Array,
-) -> Array:
+) -> tuple[Array, Array]:
     """Find the logarithms of quantities at which the increase of chi^2 equals the threshold, (n,).
 
     1. A value is tried between an inner end, below the threshold, and an outer, above it.
@@ -442,12 +397,12 @@ def crossings(
 
     Returns
     -------
-    Array
-        NaN where a deeper basin is below the threshold at the outer end: the crossing is further
-        out.
+    tuple[Array, Array]
+        The crossings, NaN where a deeper basin is below the threshold at the outer end, as the
+        crossing is further out; and their fits, (n, n_parameters).
     """
     brackets = _Brackets(fits.threshold[profile], values, increases, x)
-    crossed, left = values[1].copy(), np.arange(len(profile))
+    crossed, at_crossings, left = values[1].copy(), x[1].copy(), np.arange(len(profile))
     for trial in range(_MOST_FITS_OF_CROSSING):
         if not len(left):
             break
@@ -464,12 +419,12 @@ def crossings(
             beyond = fits.at(profile[outer], values[1, outer], fitted[missed], FINE)
             keep_lower(increases[1], x[1], outer, *beyond)
         void = increases[1, left] < brackets.threshold[left]
-        crossed[left] = np.where(void, np.nan, tried)
+        crossed[left], at_crossings[left] = np.where(void, np.nan, tried), fitted
         brackets.move(left, tried, over, fitted)
         # Where a deeper basin begins, the increase may jump past the threshold.
         apart = brackets.width(left) > _WIDTH_OF_JUMP
         left = left[(np.abs(over) > _ROOT_ERROR) & apart & ~void]
-    return crossed
+    return crossed, at_crossings
 
 
 def find_gaps(

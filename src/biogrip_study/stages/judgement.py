@@ -187,7 +187,7 @@ def judge_quantities(
     """
 
     def profile(likelihoods: Sequence[Likelihood]) -> list[Diagnosis]:
-        every = compute_findings(likelihoods, quantities, smooth=False)
+        every = compute_findings(likelihoods, quantities)
         return [profiled(*pair, []) for pair in zip(likelihoods, every, strict=True)]
 
     problems, best_fits = [fit.problem for fit in fits], [fit.found for fit in fits]
