@@ -223,9 +223,9 @@ KINDS = {
     ),
     "names an option whose value only its reader knows": (
         *(" rad, or less with a given noise (--noise) ", ", or it is below the noise: say how"),
-        *("The noise differs from one part", "what is before or after (--from, --until)"),
+        "what is before or after (--from, --until)",
         *("A ramp is given by --ramp DURATION", " % at the highest: correct for it, or leave"),
-        *(" times as much as the other: give standard", " A length is a strain by a scale or"),
+        " A length is a strain by a scale or",
         *(" A pressure sucks into a pipette", "that reading (--from)"),
         *(" Or say what is read, as by --reading ", ". Say which, as in --reading loss=COLUMN."),
         *("; give yours with --config.", " that was held, a column of it by --load, or a pro"),

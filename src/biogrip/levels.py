@@ -64,12 +64,6 @@ IN_ONE_STRETCH = 0.3
 """Share of the sum of squares that none of 20 stretches has of stationary noise which is correlated
 for less than half a stretch: what has it is no such noise."""
 
-UNEVEN = 3.0
-"""Ratio of the scatter of stretches, which white noise exceeds in 20 of them once in hundreds."""
-
-AS_THE_SCATTER = 1.44
-"""Mean square over that of the scatter up to which noise may be white: 1.05 to 1.4 if it is."""
-
 TOLD = 0.03
 """Least share of a reading's variance, or of a step's squares, that a fit leaves where it is told:
 a fit that absorbs more follows the reading. Chosen."""

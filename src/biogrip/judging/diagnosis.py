@@ -31,7 +31,6 @@ from biogrip.judging.doubts import (
     REJECTED,
     REJECTION,
     RING,
-    ROUNDED,
     FindNotes,
     Note,
     compute_status,
@@ -254,9 +253,6 @@ def with_notes(judged: Diagnosis, of_rest: list[Note]) -> Diagnosis:
         if finding.gaps
     ]
     notes += [*_range_ends(likelihood), *of_rest]
-    # Limits that allow for rounding hold, however wide they are.
-    if not any(note.about == ROUNDED for note in of_rest):
-        notes += _too_slow(judged)
     notes += _pulling(grip, residuals.duration_s)
     if not judged.converged:
         text = (
@@ -266,17 +262,6 @@ def with_notes(judged: Diagnosis, of_rest: list[Note]) -> Diagnosis:
         notes.append(Note(DOUBT, text))
     notes += _ringing(judged, rejected=compute_status(notes) == REJECTED)
     return replace(judged, grip=grip, notes=notes)
-
-
-def _too_slow(judged: Diagnosis) -> Iterator[Note]:
-    """Yield a note if limits that allow for a misfit as slow as the trace are too wide."""
-    wide = any(finding.verdict == DETERMINED and finding.is_wide for finding in judged.findings)
-    if judged.likelihood.independent < 1 and wide:
-        yield Note(
-            REJECTION,
-            "What the fit leaves is as slow as the trace, and limits that allow for it tell hardly "
-            "more than an order of magnitude: what the trace determines cannot be judged.",
-        )
 
 
 def _range_ends(likelihood: Likelihood) -> Iterator[Note]:

@@ -10,8 +10,7 @@ A step of all readings from some time on is one direction more: its share of the
 beta-distributed in white noise. `find_step` scans all times; the chance that a scan of correlated
 statistics exceeds a level is that of the first one, and for each further one that of a random
 walk's upcrossing [9]_. `compare_halves` asks whether two parts of the trace, fitted apart, agree:
-Chow's test [8]_, with the fit's slopes. Of a frequency sweep the parts are its moduli, and inertia
-is one direction more (`about_moduli`).
+Chow's test [8]_, with the fit's slopes. Inertia in a frequency sweep is one direction more, too.
 
 Residuals, (n_samples,), are over the noise's standard deviation where that is not the same. The
 basis of what the fit absorbs has orthonormal rows, (n_directions, n_samples), see `absorbed`.
@@ -28,16 +27,15 @@ References
 .. [9] D. Siegmund and B. Yakir, The Statistics of Gene Mapping, Springer, 2007: section 5.2.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from scipy.special import betainc, betaincc, fdtrc, ndtr, ndtri, pdtrc, stdtr
 
 import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray, IntArray
-from biogrip.digits import p_value, plain
+from biogrip.digits import plain
 from biogrip.fit.noise_model_fit import absorbed
 from biogrip.physics.noise import without
 from biogrip.physics.protocol import is_storage
@@ -250,37 +248,25 @@ class Steps:
     """Index of the first reading after each, (n_steps,)."""
     whole: Array
     """What each shows in residuals, (n_steps, n_samples)."""
-    basis: Array
-    """What the fit absorbs, (n_directions, n_samples)."""
-    taken: Array
-    """Parts of each along these directions, (n_steps, n_directions)."""
     norms: Array
-    """Norms of what is left of each, (n_steps,)."""
-
-    @property
-    def freedom(self) -> int:
-        """Degrees of freedom of what the fit leaves."""
-        return self.basis.shape[1] - len(self.basis)
+    """Norms of what is left of each without what the fit absorbs, (n_steps,)."""
+    change: Array
+    """One minus the correlation of what is left of each with the next, (n_steps - 1,)."""
+    freedom: int
+    """Degrees of freedom of what the fit leaves."""
 
     def along(self, residual: Array) -> Array:
-        """Return the part of residuals, (n_samples,), along each step without what is absorbed."""
+        """Return the part along each step of what a fit leaves, (n_samples,)."""
         # No matrix of what is left of all steps is formed, which takes most of the time.
-        return self.whole @ without(self.basis, residual) / self.norms
+        return self.whole @ residual / self.norms
 
     def chance(self, share: float) -> float:
         """Return the chance that white noise has such a share of its squares in one of them."""
         alone = float(betaincc(0.5, 0.5 * (self.freedom - 1), min(share, 1.0)))
-        level, change = -float(ndtri(max(alone, 1e-300) / 2)), self._change
-        half = np.maximum(0.5 * level * np.sqrt(2 * change), 1e-9)
+        level = -float(ndtri(max(alone, 1e-300) / 2))
+        half = np.maximum(0.5 * level * np.sqrt(2 * self.change), 1e-9)
         walk = (ndtr(half) - 0.5) / (half * (half * ndtr(half) + _density(half)))
-        return min(alone + float(2 * level * _density(level) * np.sum(change * walk)), 1.0)
-
-    @cached_property
-    def _change(self) -> Array:
-        """One minus the correlation of each with the next, (n_steps - 1,)."""
-        products = np.einsum("ij,ij->i", self.whole[:-1], self.whole[1:])
-        products -= np.einsum("ij,ij->i", self.taken[:-1], self.taken[1:])
-        return np.clip(1 - products / (self.norms[:-1] * self.norms[1:]), 0.0, 1.0)
+        return min(alone + float(2 * level * _density(level) * np.sum(self.change * walk)), 1.0)
 
 
 def _density(level: Array | float) -> Array:
@@ -322,7 +308,11 @@ def steps_of(basis: Array, cleared: Callable[[Array], Array]) -> Steps:
     told = square > levels.TOLD * np.minimum(of_whole, back)
     if not np.all(told):
         before, whole, taken, square = (of[told] for of in (before, whole, taken, square))
-    return Steps(before, whole, basis, taken, np.sqrt(square))
+    norms = np.sqrt(square)
+    products = np.einsum("ij,ij->i", whole[:-1], whole[1:])
+    products -= np.einsum("ij,ij->i", taken[:-1], taken[1:])
+    change = np.clip(1 - products / (norms[:-1] * norms[1:]), 0.0, 1.0)
+    return Steps(before, whole, norms, change, samples - len(basis))
 
 
 def find_step(residual: Array, basis: Array, cleared: Callable[[Array], Array]) -> Step | None:
@@ -330,7 +320,7 @@ def find_step(residual: Array, basis: Array, cleared: Callable[[Array], Array]) 
     steps = steps_of(basis, cleared)
     if not len(steps.before) or steps.freedom < 2:
         return None
-    along = steps.along(residual)
+    along = steps.along(without(basis, residual))
     found = int(np.argmax(np.abs(along)))
     size = float(along[found])
     direction = without(basis, steps.whole[found]) / steps.norms[found]
@@ -350,18 +340,15 @@ def parts_apart(basis: Array, split: int) -> Array:
     return absorbed(apart) if len(apart) else apart
 
 
-def compare_halves(residual: Array, basis: Array, split: int, freedom: float = np.inf) -> float:
-    """Return the chance that parts of white noise before and after a reading differ as much.
-
-    The noise is known with this freedom at most.
-    """
+def compare_halves(residual: Array, basis: Array, split: int) -> float:
+    """Return the chance that parts of white noise before and after a reading differ as much."""
     more = parts_apart(basis, split)
     left = len(residual) - len(basis) - len(more)
     if not len(more) or left < 1:
         return 1.0
     gained = float(np.sum((more @ residual) ** 2))
     rest = max(float(residual @ residual) - gained, 1e-300)
-    return float(fdtrc(len(more), min(left, freedom), gained / len(more) * left / rest))
+    return float(fdtrc(len(more), left, gained / len(more) * left / rest))
 
 
 def find_inertia(
@@ -384,22 +371,3 @@ def find_inertia(
         f"the frequency squared, {part} % at the highest: correct for it, or leave the highest "
         "frequencies out (--until)"
     )
-
-
-def about_moduli(
-    residuals: Residuals, residual: Array, basis: Array, growth: Array
-) -> Iterator[str]:
-    """Yield a sentence for each test that residuals over the growth of the noise fail.
-
-    The tests are for inertia, and for moduli that differ if each is fitted by itself.
-    """
-    storage = is_storage(residuals.trace.time_s)
-    is_inertia, cause = find_inertia(residuals, residual, basis, growth)
-    chance = compare_halves(residual, basis, int(np.sum(~storage)), residuals.freedom)
-    if is_inertia:
-        yield f"The fit leaves what is of {cause}."
-    elif chance < levels.FALSE_ALARM:
-        yield (
-            "The storage and the loss modulus, each fitted by itself, differ by more than white "
-            f"noise ({p_value(chance)}): {cause}."
-        )
