@@ -219,7 +219,7 @@ KINDS = {
     ),
     "typed by tests of onsets, contacts and damaged results": (
         *("--start says when", "). If it does, say --start fit", "say --contact fit"),
-        *(". Say when the protocol started (--start", "It is damaged: the same command with"),
+        *(" came. Say when the protocol started (--start", "It is damaged: the same command with"),
     ),
     "names an option whose value only its reader knows": (
         *(" rad, or less with a given noise (--noise) ", ", or it is below the noise: say how"),

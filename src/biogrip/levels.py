@@ -81,12 +81,9 @@ intervals, as a share, with which it has a spectrum. Chosen."""
 
 # The start of a protocol.
 
-SURELY, AS_GOOD = 1e-9, 1e-3
-"""Levels of the tests for a late start or another clock, so that correlated noise does not look
-like one, and for a tare or a clock that fits as well, one trace in a thousand."""
-
-UNLIKE = 0.05
-"""Level at which another start fits worse than the best: 5 %, as that of limits."""
+SURELY = 1e-9
+"""Level of the tests for a late start and a tare, so that correlated noise does not look like
+one."""
 
 CONSTANT, CONSTANT_OF_PEAK, FEWEST_BEFORE = 2.0, 1e-3, 3
 """Standard deviation of constant readings, in noise and in peaks of noise-free traces, and fewest

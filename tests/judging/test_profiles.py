@@ -10,7 +10,6 @@ from biogrip.arrays import Array, IntArray
 from biogrip.fit.least_squares import FINE
 from biogrip.fit.levenberg_marquardt import Normal
 from biogrip.fit.trace_fit import TraceFit
-from biogrip.judging import profiles
 from biogrip.judging.constrained_fits import ConstrainedFits, QuantityConstraint
 from biogrip.judging.diagnosis import diagnose
 from biogrip.judging.doubts import DOUBT, RING, Note
@@ -353,16 +352,3 @@ def test_a_fit_is_news_if_it_is_lower_by_a_thousandth() -> None:
         increases, x = np.array([3.0, 10.0]), np.zeros((2, 1))
         news = keep_lower(increases, x, np.array([1]), np.array([lower]), np.ones((1, 1)))
         assert (news.tolist(), increases[1], x[1, 0]) == ([False, expected], lower, 1.0)
-
-
-def test_a_value_is_tried_where_excesses_vanish_or_halfway() -> None:
-    """By hand: roots of 4, 1 and 25 are 2, 1 and 5, so that lines cross 2 at a quarter of 4."""
-    ends = np.array([[0.0], [4.0]]), np.array([[1.0], [25.0]]), np.array([[[0.0]], [[8.0]]])
-    brackets, one = profiles._Brackets(np.array([4.0]), *ends), np.zeros(1, dtype=np.int64)
-    assert [part.item() for part in brackets.between(one)] == [1.0, 2.0]
-    brackets.move(one, np.array([1.0]), np.array([-1.0]), np.array([[2.0]]))
-    assert [part.item() for part in brackets.between(one)] == [1.75, 3.5]
-    # The outer end stays a second time: its excess of 3 counts half.
-    brackets.move(one, np.array([2.0]), np.array([-0.5]), np.array([[4.0]]))
-    assert [part.item() for part in brackets.between(one)] == [2.5, 5.0]
-    assert brackets.width(one).item() == 2.0

@@ -5,11 +5,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from biogrip.judging.likelihood import headlines
 from biogrip.records import write_rows
 from biogrip_study.records.identifications import identification_columns
 from biogrip_study.tables import sweeps as stage
-from biogrip_study.tables.sweeps import robustness
+from biogrip_study.tables.sweeps import headlines, robustness
 from tests.helpers.default import study_of
 from tests.helpers.problems import MODEL, rotation
 

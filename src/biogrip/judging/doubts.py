@@ -267,10 +267,8 @@ def name_suspects(residuals: Residuals, times: float, scale: float) -> str:
     fit = fit_any_sample(residuals)
     other, left = fit.sd / scale, fit.left_of_readings()
     least = plain(other, 2)
-    gives, culprits = (
-        "gives this trace under this protocol",
-        "load, clock, contact, drift, or a sample that is not linear",
-    )
+    gives = "gives this trace under this protocol"
+    culprits = "load, clock, contact, drift, or a sample that is not linear"
     if residuals.course.sweeps:
         gives = "has both moduli (Kramers-Kronig)"
         _, culprits = whiteness.find_inertia(residuals, *left)
@@ -398,20 +396,17 @@ def _about_given(likelihood: Likelihood, residual: Array) -> Iterator[Note]:
     chi_squared = float(residual @ residual) / likelihood.noise_sd**2
     share = float(np.sqrt(chi_squared / left))
     if share < levels.TOO_LITTLE and float(chdtr(left, chi_squared)) < levels.FALSE_ALARM:
-        yield Note(
-            DOUBT,
-            f"The noise that was given is {plain(1 / share, 2)} times what the fit leaves: its "
-            "value, or its unit, is not the right one.",
-        )
-    if share > 1 and float(chdtrc(left, chi_squared)) < levels.FALSE_ALARM:
-        much, so = share > levels.TOO_MUCH, "limits are too narrow by that"
-        if much:
+        weight, so = DOUBT, "its value or unit is not the right one"
+    elif share > 1 and float(chdtrc(left, chi_squared)) < levels.FALSE_ALARM:
+        weight, so = HARMLESS, "limits are too narrow by that"
+        if share > levels.TOO_MUCH:
             suspects = name_suspects(residuals, share, likelihood.noise_sd)
-            so = f"its value or unit is not the right one, or {suspects}"
-        yield Note(
-            DOUBT if much else HARMLESS,
-            f"What the fit leaves is {plain(share, 3)} times the noise that was given: {so}.",
-        )
+            weight, so = DOUBT, f"its value or unit is not the right one, or {suspects}"
+    else:
+        return
+    yield Note(
+        weight, f"What the fit leaves is {plain(share, 3)} times the noise that was given: {so}."
+    )
 
 
 # Stretches of `IN_ONE_STRETCH`.

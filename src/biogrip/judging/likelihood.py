@@ -19,7 +19,7 @@ References
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
 from math import inf
@@ -175,10 +175,8 @@ def characteristic_times(model: SampleModel) -> list[Quantity]:
         parallel = index == ["p"] and model.name != "kelvin_voigt"
         if letter != "c" or spring not in model.names or parallel or model.power_law:
             continue
-        pair, of_branch = (
-            (damper, model.names.index(spring)),
-            "".join(f"_{{{digit}}}" for digit in index),
-        )
+        pair = damper, model.names.index(spring)
+        of_branch = "".join(f"_{{{digit}}}" for digit in index)
         label, symbol = "_".join(["tau", *index]), rf"$\tau{of_branch}$"
         times.append(Quantity(label, symbol, "s", pair, sign=(1, -1), penalties=_ordered(model)))
     return times
@@ -334,12 +332,18 @@ def check_rows(likelihood: Likelihood) -> None:
 
 
 def find_thresholds(confidence: float, freedom: float) -> tuple[float, float]:
-    """Return increases of chi^2 at limits and at `CERTAIN`: chi-squared(1), or F(1, freedom)."""
-    at_limits, certain = (
-        float(chdtri(1, 1 - level) if freedom == inf else fdtri(1, freedom, level))
-        for level in (confidence, levels.CERTAIN)
-    )
-    return at_limits, certain
+    """Return increases of chi^2 at limits and at `CERTAIN`: see `increase_at`."""
+    return increase_at(confidence, freedom), increase_at(levels.CERTAIN, freedom)
+
+
+def increase_at(confidence: float, freedom: float, told: int = 1) -> float:
+    """Return a quantile of chi-squared of what is told, or as many times one of F(told, freedom).
+
+    It is of chi-squared if the freedom, with which the noise is known, is infinite.
+    """
+    if freedom == inf:
+        return float(chdtri(told, 1 - confidence))
+    return told * float(fdtri(told, freedom, confidence))
 
 
 def compute_fall(samples: int, before: float, after: float, noise_sd: float | None = None) -> float:
@@ -432,25 +436,3 @@ def bounds_percent(
     with np.errstate(divide="ignore"):
         logarithms = np.log(values)
     return [(q, 100 * least_sd(np.array(sensitivity), sigma, logarithms, q)) for q in quantities]
-
-
-def headlines(bounds: Sequence[tuple[str, float]]) -> list[str]:
-    """Return the best and the worst determined quantity of several points, by label.
-
-    Quantities count if their bound in percent, not NaN, is below `DETERMINED_PERCENT` at half of
-    the points or more. Parts of a sum, which may trade against each other, do not count beside it.
-    """
-    percents: dict[str, list[float]] = {}
-    for label, percent in bounds:
-        if not math.isnan(percent):
-            percents.setdefault(label, []).append(percent)
-    medians = sorted(
-        (float(np.median(bounds_of_one)), label) for label, bounds_of_one in percents.items()
-    )
-    parts = {part for label in percents if " + " in label for part in label.split(" + ")}
-    determined = [
-        label
-        for percent, label in medians
-        if percent < levels.DETERMINED_PERCENT and label not in parts
-    ]
-    return determined[:1] + determined[1:][-1:]

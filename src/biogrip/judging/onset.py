@@ -38,6 +38,7 @@ from biogrip.physics.modes import lag_course
 from biogrip.physics.noise import estimate_noise, nuisance_basis, without
 from biogrip.physics.protocol import evaluate, spacing_at
 from biogrip.physics.residuals import Residuals
+from biogrip.traces.reader import Recording
 
 _LAGS_A_DECADE = 2
 # Delays on the first grid; finer ones have as many between the neighbours of the best.
@@ -196,13 +197,8 @@ class OnsetFits:
         # Imported here: loading it takes longer than a short job.
         from scipy.optimize import least_squares
 
-        low, high = (
-            np.append(ends, onset_s)
-            for ends, onset_s in (
-                (problem.low, low_s + inside_s),
-                (problem.high, high_s - inside_s),
-            )
-        )
+        low = np.append(problem.low, low_s + inside_s)
+        high = np.append(problem.high, high_s - inside_s)
 
         def of(x: Array) -> Array:
             return self.posed(x[-1]).residuals.left(x[:-1]) / size
@@ -232,47 +228,46 @@ class OnsetFits:
         yield from pairwise(edges[max(after - _NEAR, 0) : after + _NEAR].tolist())
 
 
-# Starts from 0 to the first reading that are tried for a better one.
-_BETWEEN = 5
-# Starts that are compared, the last so much of an interval before the first reading.
-_STARTS, _NEAREST = 40, 0.01
+# Starts within the limits of a fitted one, from it, over these: as on a circle.
 _SHARES = np.sin(np.pi * np.arange(1, 3) / 6)
 # First change of the onset over how far readings are apart there, and most of it as a share of the
 # trace.
 _FIRST_STEP, _MOST = 1 / 64, 0.25
 # Start that is earlier by so much of an interval, for differences.
 _EARLIER = 0.1
-# Newton steps that move a load along the clock, and by how many readings at most; share of squares
-# of what moves that is rounding.
-_STEPS_OF_CLOCK, _MOST_ROWS, _TOLD = 3, 3.0, 1e-6
+# Most readings by which a load is moved along the clock, and accuracy of that; share of squares of
+# what moves that is rounding.
+_MOST_ROWS, _ACCURACY_OF_CLOCK, _TOLD = 4.0, 0.01, 1e-6
 # Accuracy of an end of the onset's interval, as a share of its distance.
 _ACCURACY = 0.02
 
 
 def notes_on_start(
-    experiment: Experiment,
-    time_s: Array,
-    readings: Array,
-    diagnosis: Diagnosis,
+    recording: Recording, experiment: Experiment, diagnosis: Diagnosis
 ) -> list[Note]:
     """Return notes on another start of the protocol than at 0, and on a ramp.
 
     A trace that begins constant, and fits far better with a later start, tells nothing of the
     sample under the protocol as given, whatever noise model absorbs the misfit: the test is a
-    likelihood ratio. One that begins as if cut off there may be on another clock. Times ascend,
-    (n_samples,), and the diagnosis is that of the best fit with a start at 0.
+    likelihood ratio. One that begins as if cut off there may be on another clock. The diagnosis is
+    that of the best fit with a start at 0.
     """
-    residuals = diagnosis.likelihood.problem.residuals
-    fits, ramped = OnsetFits(experiment, time_s, readings), _with_ramp(residuals)
-    notes: list[Note] = []
-    if not experiment.start_given and ramped and is_cut_off(time_s):
-        notes += _about_clock(fits, diagnosis)
-    elif not experiment.start_given and begins_constant(time_s, readings):
+    time_s, readings = recording.time_s, recording.readings
+    given, notes = experiment.start_given, list[Note]()
+    ramped = _with_ramp(diagnosis.likelihood.problem.residuals)
+    if not given and ramped and recording.read.from_s is None and is_cut_off(time_s):
+        text = (
+            f"The readings begin {plain(time_s[0])} s after the step of the protocol, as if on the "
+            "clock of something longer: values hang on when it came. Say when the protocol started "
+            "(--start, measurement.start_s), be it at 0, or what came before (--config, protocol)."
+        )
+        notes.append(Note(DOUBT, text))
+    elif not given and begins_constant(time_s, readings):
         # A constant that is not zero is an offset, with which the onset would be biased.
         free = replace(experiment, offset=True)
         onset_s = estimate_onset(experiment, time_s, readings)
         if begins_constant(time_s, readings, onset_s):
-            notes += _about_late_onset(replace(fits, experiment=free), diagnosis, onset_s)
+            notes += _about_late_onset(OnsetFits(free, time_s, readings), diagnosis, onset_s)
     if diagnosis.status != REJECTED and ramped and not notes:
         notes += _about_ramp(diagnosis, ramped, recorded=experiment.record is not None)
     smooth = experiment.record is not None and not experiment.uncertainty.get("steps")
@@ -309,31 +304,30 @@ def _about_late_onset(fits: OnsetFits, diagnosis: Diagnosis, guess_s: float) -> 
 
 
 def _about_load(diagnosis: Diagnosis) -> Iterator[Note]:
-    """Yield a note if a recorded load that comes earlier or later, by Newton steps, fits better."""
-    given = other = diagnosis.likelihood
-    residuals, late_s, needed = given.problem.residuals, 0.0, chdtri(1, levels.FALSE_ALARM)
-    spacing_s = spacing_at(residuals.trace.time_s, 0.0)
-    aside_s = _EARLIER * spacing_s
-    for _ in range(_STEPS_OF_CLOCK):
-        here = other.problem.residuals
-        residual, slopes = here(other.best)
-        basis = absorbed(np.vstack((slopes, here.trace.condensed.taken)))
-        change = here.later(aside_s).left(other.best) - residual
-        moved = without(basis, change)
-        told = float(moved @ moved)
-        if told <= _TOLD * float(change @ change):
-            return
-        step = -float(moved @ residual) / told
-        if other is given and step**2 * told < needed * given.misfit**2:
-            return
-        late_s += step * aside_s
-        if abs(late_s) > _MOST_ROWS * spacing_s:
-            return
-        other = _at(given, late_s)
+    """Yield a note if a recorded load that comes earlier or later fits better."""
+    given, residuals = diagnosis.likelihood, diagnosis.likelihood.problem.residuals
+    needed, spacing_s = chdtri(1, levels.FALSE_ALARM), spacing_at(residuals.trace.time_s, 0.0)
+    residual, slopes = residuals(given.best)
+    basis = absorbed(np.vstack((slopes, residuals.trace.condensed.taken)))
+    change = residuals.later(_EARLIER * spacing_s).left(given.best) - residual
+    moved = without(basis, change)
+    told = float(moved @ moved)
+    by_chance = float(moved @ residual) ** 2 < needed * given.misfit**2 * told
+    if by_chance or told <= _TOLD * float(change @ change):
+        return
+    from scipy.optimize import minimize_scalar
+
+    most_s = _MOST_ROWS * spacing_s
+    late_s = minimize_scalar(
+        lambda start_s: _at(given, start_s).misfit,
+        bounds=(-most_s, most_s),
+        options={"xatol": _ACCURACY_OF_CLOCK * spacing_s},
+    ).x
+    other = _at(given, late_s)
     fall_from = partial(compute_fall, residuals.samples, after=other.misfit)
     fall = fall_from(given.misfit, noise_sd=residuals.trace.known_noise)
     values = _moved(diagnosis, [other.best], 0.5)
-    if fall > needed and values:
+    if fall > needed and values and abs(late_s) < most_s - spacing_s:
         yield Note(
             DOUBT,
             f"The {residuals.instrument.controlled.name} seems to be logged "
@@ -350,65 +344,12 @@ def is_cut_off(time_s: Array) -> bool:
     to the time, as of readings that someone spaced from 0 on.
     """
     few = max(levels.FEWEST_APART, len(time_s) // 10)
-    first_s, last_s = (
-        float(np.ptp(ends)) / few for ends in (time_s[: few + 1], time_s[-few - 1 :])
-    )
+    first_s = float(time_s[few] - time_s[0]) / few
+    last_s = float(time_s[-1] - time_s[-1 - few]) / few
     if time_s[0] <= levels.DELAYED * first_s:
         return False
     growth = np.log(last_s / first_s) / np.log(time_s[-1 - few] / time_s[0])
     return not levels.PLANNED[0] < growth < levels.PLANNED[1]
-
-
-def _about_clock(fits: OnsetFits, diagnosis: Diagnosis) -> Iterator[Note]:
-    """Yield a note if a trace may be on another clock, with its step some time before it."""
-    time_s, best, rejected = fits.time_s, diagnosis.likelihood.best, diagnosis.status == REJECTED
-    interval_s, given = time_s[1] - time_s[0], fits.at(0.0, best)
-    later_s, fall_to = time_s[0] - interval_s, partial(compute_fall, len(time_s), given.misfit)
-    level = chdtri(1, levels.SURELY)
-    if rejected:
-        other = fits.best(later_s)
-    else:
-        tried_s = np.linspace(0.0, later_s, _BETWEEN + 1)[1:].tolist()
-        other = min((fits.at(start_s, best) for start_s in tried_s), key=lambda fit: fit.misfit)
-        if fall_to(other.misfit) > level:
-            other = fits.near(other)
-    alike, fall = _as_good(fits, other), fall_to(other.misfit)
-    first_s, last_s = (end(fit.onset_s for fit in alike) for end in (min, max))
-    if (
-        fall > level
-        and 0 < other.onset_s < time_s[0]
-        and other.misfit < levels.WHITE * (estimate_noise(fits.readings))
-    ):
-        found = f"the fit is far better (χ² falls by {plain(fall)})"
-    else:
-        shifted = [best + fit.log_parameters - given.log_parameters for fit in alike]
-        moved = _moved(diagnosis, shifted, 0.5)
-        if rejected or fall <= -chdtri(1, levels.AS_GOOD) or not moved:
-            return
-        found = f"the trace fits as well: {moved}"
-    when = f"at any time from {first_s:.4g} to {last_s:.4g} s"
-    when = f"at {other.onset_s:.4g} s" if last_s - first_s < interval_s else when
-    yield Note(
-        REJECTION if rejected else DOUBT,
-        f"The readings begin {plain(time_s[0])} s after the step of the protocol. If it starts "
-        f"{when} of the clock, {found}. Say when the protocol started "
-        "(--start, measurement.start_s), be it at 0, or what came before (--config, protocol).",
-    )
-
-
-def _as_good(fits: OnsetFits, best: OnsetFit) -> list[OnsetFit]:
-    """Return fits of onsets from 0 to the first reading that are as good as the best, and that."""
-    first_s, interval_s = fits.time_s[0], fits.time_s[1] - fits.time_s[0]
-    onsets_s = first_s - np.geomspace(_NEAREST * interval_s, first_s, _STARTS)
-    found = [best]
-    for side in (onsets_s[onsets_s < best.onset_s], onsets_s[onsets_s > best.onset_s][::-1]):
-        near = best
-        for onset_s in side.tolist():
-            near = fits.at(onset_s, near.log_parameters)
-            if compute_fall(len(fits.time_s), near.misfit, best.misfit) > chdtri(1, levels.UNLIKE):
-                break
-            found.append(near)
-    return found
 
 
 def _moved(diagnosis: Diagnosis, others: Sequence[Array], widths: float) -> str:

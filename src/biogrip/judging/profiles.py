@@ -307,10 +307,8 @@ def _find_crossings(points: Points) -> tuple[Array, Array]:
     while len(profile):
         below = np.flatnonzero(points.increases < fits.threshold[points.profile])
         of_below = points.profile[below]
-        first, last = (
-            np.searchsorted(of_below, profile),
-            np.searchsorted(of_below, profile, "right") - 1,
-        )
+        first = np.searchsorted(of_below, profile)
+        last = np.searchsorted(of_below, profile, "right") - 1
         inside = below[np.where(end == 0, first, last)]
         outside = np.where(end == 0, inside - 1, inside + 1)
         both = np.stack((inside, outside))
@@ -327,46 +325,6 @@ def _find_crossings(points: Points) -> tuple[Array, Array]:
 
 # Most fits for a crossing, and the width of an interval in which a profile jumps.
 _MOST_FITS_OF_CROSSING, _WIDTH_OF_JUMP = 40, 1e-7
-
-
-class _Brackets:
-    """Inner and outer ends of n crossings: values, excesses of the root of chi^2, nearest fits.
-
-    Inner ends are below the threshold, (2, n), and outer ones above.
-    """
-
-    def __init__(self, threshold: Array, values: Array, increases: Array, x: Array) -> None:
-        self.threshold, self._root_threshold = threshold, np.sqrt(threshold)
-        self.values, self.x = values.copy(), x.copy()
-        every = np.arange(len(threshold))
-        self.excess = np.stack([self.excess_of(of_end, every) for of_end in increases])
-        self._moved = np.full(len(threshold), -1)
-
-    def excess_of(self, increases: Array, which: IntArray) -> Array:
-        """Return roots of increases of chi^2 minus that of the threshold, (n,)."""
-        return np.sqrt(np.maximum(increases, 0.0)) - self._root_threshold[which]
-
-    def width(self, which: IntArray) -> Array:
-        """Return the distances between both ends, (n,)."""
-        return np.abs(self.values[1, which] - self.values[0, which])
-
-    def between(self, which: IntArray) -> tuple[Array, Array]:
-        """Return values where excesses, joined by lines, vanish, and parameters there."""
-        share = self.excess[0, which] / (self.excess[0, which] - self.excess[1, which])
-        tried = self.values[0, which] + share * (self.values[1, which] - self.values[0, which])
-        return tried, self.x[0, which] + share[:, None] * (self.x[1, which] - self.x[0, which])
-
-    def move(self, which: IntArray, tried: Array, over: Array, fitted: Array) -> None:
-        """Move an end to tried values, by the Illinois rule.
-
-        The excess of an end that stays a second time is halved, so that the end moves, too.
-        """
-        side = (over > 0).astype(np.int64)
-        self.values[side, which], self.excess[side, which] = tried, over
-        self.x[side, which] = fitted
-        again = self._moved[which] == side
-        self.excess[1 - side[again], which[again]] *= 0.5
-        self._moved[which] = side
 
 
 def crossings(
@@ -401,30 +359,44 @@ def crossings(
         The crossings, NaN where a deeper basin is below the threshold at the outer end, as the
         crossing is further out; and their fits, (n, n_parameters).
     """
-    brackets = _Brackets(fits.threshold[profile], values, increases, x)
+    threshold = fits.threshold[profile]
+    ends, ends_x, excess = values.copy(), x.copy(), excess_of(increases, threshold)
     crossed, at_crossings, left = values[1].copy(), x[1].copy(), np.arange(len(profile))
+    moved = np.full(len(profile), -1)
     for trial in range(_MOST_FITS_OF_CROSSING):
         if not len(left):
             break
-        tried, between = brackets.between(left)
-        starts = np.concatenate((between[None], brackets.x[:, left]))
+        share = excess[0, left] / (excess[0, left] - excess[1, left])
+        tried = ends[0, left] + share * (ends[1, left] - ends[0, left])
+        inner_x, outer_x = ends_x[:, left]
+        starts = np.stack((inner_x + share[:, None] * (outer_x - inner_x), inner_x, outer_x))
         if not trial:
             _, deepest = fits.from_each(profile, tried, elsewhere, FAIR)
             starts = np.concatenate((starts, deepest[None]))
         reached, fitted = fits.from_each(profile[left], tried, starts, FINE)
-        over = brackets.excess_of(np.min(reached, axis=0), left)
-        missed = brackets.excess_of(reached[2], left) > over + _ROOT_ERROR
+        over = excess_of(np.min(reached, axis=0), threshold[left])
+        missed = excess_of(reached[2], threshold[left]) > over + _ROOT_ERROR
         if np.any(missed):
             outer = left[missed]
             beyond = fits.at(profile[outer], values[1, outer], fitted[missed], FINE)
             keep_lower(increases[1], x[1], outer, *beyond)
-        void = increases[1, left] < brackets.threshold[left]
+        void = increases[1, left] < threshold[left]
         crossed[left], at_crossings[left] = np.where(void, np.nan, tried), fitted
-        brackets.move(left, tried, over, fitted)
+        side = (over > 0).astype(np.int64)
+        ends[side, left], ends_x[side, left], excess[side, left] = tried, fitted, over
+        # The excess of an end that stays a second time is halved, so that the end moves, too.
+        again = moved[left] == side
+        excess[1 - side[again], left[again]] *= 0.5
+        moved[left] = side
         # Where a deeper basin begins, the increase may jump past the threshold.
-        apart = brackets.width(left) > _WIDTH_OF_JUMP
+        apart = np.abs(ends[1, left] - ends[0, left]) > _WIDTH_OF_JUMP
         left = left[(np.abs(over) > _ROOT_ERROR) & apart & ~void]
     return crossed, at_crossings
+
+
+def excess_of(increases: Array, threshold: Array) -> Array:
+    """Return roots of increases of chi^2 minus that of the threshold, (..., n)."""
+    return np.sqrt(np.maximum(increases, 0.0)) - np.sqrt(threshold)
 
 
 def find_gaps(

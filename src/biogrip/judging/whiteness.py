@@ -177,9 +177,8 @@ def far_out(residual: Array, struck: BoolArray, basis: Array, freedom: float = n
         return 1.0
     away = np.abs(apart) / np.sqrt(1 + np.sum(own * through, axis=0)) / scale
     known = min(free, freedom)
-    most, least = (
-        2 * len(residual) * float(stdtr(known, -far)) for far in (away.max(), away.min())
-    )
+    most = 2 * len(residual) * float(stdtr(known, -away.max()))
+    least = 2 * len(residual) * float(stdtr(known, -away.min()))
     # Two tests, so each at half the level.
     chance = 2 * min(float(pdtrc(0, most)), float(pdtrc(count - 1, least)))
     return min(chance, 1.0)
