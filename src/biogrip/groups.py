@@ -21,7 +21,7 @@ from biogrip.errors import BiogripError, nearest
 from biogrip.files import atomic_write
 from biogrip.judging.cells import COLUMNS, Cell, Compared, Told, compare, gather, shared_columns
 from biogrip.judging.doubts import DOUBTFUL, OK, REJECTED
-from biogrip.judging.verdicts import (
+from biogrip.judging.profiles import (
     BOUNDED_ABOVE,
     BOUNDED_BELOW,
     DETERMINED,

@@ -10,7 +10,7 @@ import biogrip.levels as levels
 from biogrip import __version__
 from biogrip.digits import counted, instant, legible, plain, with_limits, with_unit, within_limits
 from biogrip.judging.doubts import DOUBT, DOUBTFUL, HARMLESS, OK, REJECTED, REJECTION
-from biogrip.judging.verdicts import FIT_REJECTED, NOT_DETERMINED
+from biogrip.judging.profiles import FIT_REJECTED, NOT_DETERMINED
 from biogrip.judging.what_moves import LEAST_MOVE, error_in_words
 from biogrip.judging.without_model import BEYOND, EXPONENT, FLOW, LEVEL, LOSS
 from biogrip.physics.instruments import INSTRUMENTS

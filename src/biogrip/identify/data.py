@@ -10,7 +10,7 @@ from biogrip.fit.experiment import Experiment
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.judging.doubts import REJECTED, REJECTION, find_reasons, order_notes
 from biogrip.judging.linearity import NOT_LINEAR
-from biogrip.judging.verdicts import FIT_REJECTED, Finding
+from biogrip.judging.profiles import FIT_REJECTED, Finding
 from biogrip.physics.noise import within
 from biogrip.physics.simulation import simulated_response
 from biogrip.traces.reader import Recording
@@ -54,7 +54,6 @@ def judged_data(diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def _finding(finding: Finding, *, rejected: bool) -> dict[str, Any]:
-    profile = finding.profile
     best = f"{plain(finding.value)} {finding.quantity.unit}".rstrip()
     return {
         "quantity": finding.quantity.label,
@@ -71,8 +70,8 @@ def _finding(finding: Finding, *, rejected: bool) -> dict[str, Any]:
         if rejected
         else finding.words(),
         "profile": {
-            "values": [float(value) for value in np.exp(profile.log_values)],
-            "increases": [round_increase(float(increase)) for increase in profile.increases],
+            "values": [float(value) for value in np.exp(finding.log_values)],
+            "increases": [round_increase(float(increase)) for increase in finding.increases],
         },
     }
 

@@ -127,7 +127,7 @@ def _notes_on_trace(
         from biogrip.identify.contact import notes_on_contact
 
         start += notes_on_contact(replace(judged, recording=recording, experiment=experiment))
-    start = start or notes_on_start(experiment, recording.time_s, recording.readings, judged)
+    start = start or notes_on_start(recording, experiment, judged)
     yield from start
     rounded = any(note.about == ROUNDED and note.weight == DOUBT for note in judged.notes)
     # Beside another start, or errors of rounding, an offset and a drift mean nothing.

@@ -51,7 +51,7 @@ from biogrip.judging.doubts import (
 )
 from biogrip.judging.likelihood import compute_fall, make_likelihood
 from biogrip.judging.onset import OnsetFits
-from biogrip.judging.verdicts import Finding
+from biogrip.judging.profiles import Finding
 from biogrip.physics.fractional import LONGEST_S, SHORTEST_S
 from biogrip.physics.models import CANDIDATES
 from biogrip.physics.noise import drift_is_flow, without

@@ -17,7 +17,7 @@ from biogrip.digits import legible, significant, with_unit
 from biogrip.errors import BiogripError
 from biogrip.figures.fit import scale_of
 from biogrip.files import write_text
-from biogrip.judging.quantities import PROVIDED, quantity_value
+from biogrip.judging.likelihood import PROVIDED, quantity_value
 from biogrip.judging.what_moves import error_in_words
 from biogrip.page.templates import data_url, environment
 from biogrip.physics.noise import rms
