@@ -20,9 +20,8 @@ from biogrip.fit.problem import ReportProgress, silent
 from biogrip.fit.trace_fit import TraceFit
 from biogrip.identify.other_fits import (
     Trace,
+    compare_models,
     fits_of,
-    judge_again,
-    models_tried,
     note_flow,
     note_saturated,
     second_opinions,
@@ -81,14 +80,13 @@ def identify_alike(
         [fit.found for fit in fits],
         confidence=first.confidence,
     )
+    judged = [
+        replace(diagnosis, recording=recording, experiment=experiment, fit=fit)
+        for diagnosis, (recording, experiment), fit in zip(judged, traces, fits, strict=True)
+    ]
     if not first.simulated:
         doing("trying other sample models")
-        models = models_tried(traces, fits, judged)
-        judged = [
-            replace(judge_again(fit, own, tried), models=tried)
-            for fit, own, tried in zip(fits, judged, models, strict=True)
-        ]
-        judged = with_times(judged)
+        judged = with_times(compare_models(judged))
     for index, (recording, experiment) in enumerate(traces):
         if experiment.fit_start:
             judged[index] = profile_over_onset(judged[index], recording.time_s)
@@ -96,22 +94,16 @@ def identify_alike(
         doing("trying an offset and a drift")
     notes = [_notes_on_fit(*pair) for pair in zip(fits, experiments, strict=True)]
     if not first.simulated:
-        given = zip(traces, judged, notes, second_opinions(traces, judged), strict=True)
-        notes = [[*_notes_on_trace(*trace, own, *said)] for trace, own, *said in given]
-    return [
-        replace(own, notes=[*own.notes, *more], recording=recording, experiment=experiment, fit=fit)
-        for (recording, experiment), fit, own, more in zip(traces, fits, judged, notes, strict=True)
-    ]
+        opinions = second_opinions(judged)
+        given = zip(judged, notes, opinions, strict=True)
+        notes = [[*_notes_on_trace(*of_trace)] for of_trace in given]
+    pairs = zip(judged, notes, strict=True)
+    return [replace(diagnosis, notes=[*diagnosis.notes, *more]) for diagnosis, more in pairs]
 
 
-def _notes_on_trace(
-    recording: Recording,
-    experiment: Experiment,
-    judged: Diagnosis,
-    on_fit: list[Note],
-    opinion: list[Note],
-) -> Iterator[Note]:
+def _notes_on_trace(judged: Diagnosis, on_fit: list[Note], opinion: list[Note]) -> Iterator[Note]:
     """Yield notes on the reading of a trace, its fit, its start, and terms not declared."""
+    recording, experiment = judged.identified
     for text in recording.remarks():
         yield Note(HARMLESS, text)
     if fixed := " and ".join(experiment.fixed):
@@ -126,7 +118,7 @@ def _notes_on_trace(
         # Imported here: most traces are of no tip.
         from biogrip.identify.contact import notes_on_contact
 
-        start += notes_on_contact(replace(judged, recording=recording, experiment=experiment))
+        start += notes_on_contact(judged)
     start = start or notes_on_start(experiment, recording.time_s, recording.readings, judged)
     yield from start
     rounded = any(note.about == ROUNDED and note.weight == DOUBT for note in judged.notes)

@@ -1,7 +1,7 @@
 """Other fits that are held against that of a trace: sample models, an offset and a drift.
 
 Several sample models are fitted with the noise model of the trace's fit, and ranked by AIC and BIC;
-with fixed parameters none are. If the own model fits better than it was diagnosed, the trace is
+with fixed parameters none are. If the chosen model fits better than it was diagnosed, the trace is
 diagnosed again.
 
 An offset and a drift that the user did not declare are fitted along. The test is a likelihood
@@ -9,7 +9,7 @@ ratio: if neither is in the trace, the decrease of chi^2 follows a chi-squared d
 many degrees of freedom as terms are added (Wilks 1938).
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -29,8 +29,6 @@ from biogrip.fit.nested_fits import (
     aic_and_bic,
     fit_models,
     is_within,
-    one_branch_more,
-    preferred,
     ranked,
     vanished,
     within_range,
@@ -65,6 +63,7 @@ _TERMS = 2
 _ROUNDING = 1e-6
 # Each of the others would take half a second to five; they are tried where the config names them.
 _POWER_LAWS = ["fractional_kelvin_voigt", "fractional_maxwell"]
+_SAME_NETWORK = "liquid_drop", "zener_maxwell"
 
 
 Trace = tuple[Recording, Experiment]
@@ -79,60 +78,51 @@ def fits_of(traces: Sequence[Trace], progress: ReportProgress) -> list[TraceFit]
     return fit_least_squares(experiments, posed, rngs, progress)
 
 
-def models_tried(
-    traces: Sequence[Trace], fits: Sequence[TraceFit], diagnoses: Sequence[Diagnosis]
-) -> list[FittedModels]:
+def compare_models(diagnoses: Sequence[Diagnosis]) -> list[Diagnosis]:
     """Fit several sample models to each trace, all of the same chosen model and budget.
 
     Best fits so far are among the starts. Branches are added until a further one does not help. Of
     the usual models those are spared that cannot suit the trace better than one that is fitted.
     """
-    every = [FittedModels(traces[0][1].sample.candidate) for _ in traces]
-    names = [_candidates(own[1], fit) for own, fit in zip(traces, fits, strict=True)]
+    chosen = diagnoses[0].identified[1].sample.candidate
+    compared = [replace(diagnosis, models=FittedModels(chosen)) for diagnosis in diagnoses]
+    names = [*map(_candidates, compared)]
     while left := dict.fromkeys(filter(None, names)):
         for some in left:
-            which = [index for index, own in enumerate(names) if own == some]
-            own = [(traces[index], fits[index], diagnoses[index]) for index in which]
-            for index, each, found in zip(which, own, _tried(own, some), strict=True):
-                more = _one_branch_more(each, found)
-                every[index], names[index] = found, (*some, more) if more else ()
-    return every
+            which = [trace for trace, of_trace in enumerate(names) if of_trace == some]
+            for trace, models in zip(
+                which, _tried([compared[i] for i in which], some), strict=True
+            ):
+                compared[trace] = replace(compared[trace], models=models)
+                more = _one_branch_more(compared[trace], models)
+                names[trace] = (*some, more) if more else ()
+    return [*map(_judge_again, compared)]
 
 
-_Own = tuple[Trace, TraceFit, Diagnosis]
-
-
-def _one_branch_more(own: _Own, models: FittedModels) -> str | None:
+def _one_branch_more(diagnosis: Diagnosis, models: FittedModels) -> str | None:
     """Return the model with one branch more than the best one, if it was not tried and may be."""
-    (_, experiment), fit, _ = own
-    name = one_branch_more(models.tried, adequate=models.adequate)
-    if not experiment.usual_models or name is None or name in models.spared:
+    name = models.one_branch_more()
+    if not diagnosis.identified[1].usual_models or name is None or name in models.spared:
         return None
-    return name if len(CANDIDATES[name].model.names) <= _most(experiment, fit) else None
+    return name if len(CANDIDATES[name].model.names) <= _most(diagnosis) else None
 
 
-def _tried(own: Sequence[_Own], names: Sequence[str]) -> list[FittedModels]:
-    """Fit sample models to traces, each with its fit and diagnosis by the chosen model."""
-    first = own[0][0][1]
-    chosen = first.sample.candidate
-    problems = {
-        name: [
-            experiment.for_model(fit.problem, CANDIDATES[name].model)
-            for (_, experiment), fit, _ in own
-        ]
-        for name in names
-    }
-    streams = {
-        name: [experiment.stream(f"model {name}") for (_, experiment), _, _ in own]
-        for name in names
-    }
-    near = {chosen: np.array([diagnosis.likelihood.best for _, _, diagnosis in own])}
-    growths = [_growth(diagnosis) for _, _, diagnosis in own]
-    worth = _worth(own, growths)
-    found = fit_models(problems, first.least_squares, streams, near=near, worth=worth)
+def _tried(diagnoses: Sequence[Diagnosis], names: Sequence[str]) -> list[FittedModels]:
+    """Fit sample models to traces that were diagnosed by the chosen one."""
+    first, chosen = diagnoses[0].identified[1], diagnoses[0].identified[1].sample.candidate
+    problems, streams = {}, {}
+    for name in names:
+        model, pairs = CANDIDATES[name].model, [(one, one.identified[1]) for one in diagnoses]
+        problems[name] = [which.for_model(one.likelihood.problem, model) for one, which in pairs]
+        streams[name] = [which.stream(f"model {name}") for _, which in pairs]
+    near = {chosen: np.array([diagnosis.likelihood.best for diagnosis in diagnoses])}
+    growths = [*map(_growth, diagnoses)]
+    worth = _worth(diagnoses, growths)
+    fits = fit_models(problems, first.least_squares, streams, near=near, worth=worth)
     every = []
-    for place, ((recording, experiment), fit, diagnosis) in enumerate(own):
-        answers = {name: found[name][place] for name in names if place in found[name]}
+    for place, (diagnosis, growth) in enumerate(zip(diagnoses, growths, strict=True)):
+        recording, experiment = diagnosis.identified
+        answers = {name: fits[name][place] for name in names if place in fits[name]}
         posed = {name: problems[name][place] for name in answers}
         if experiment.fit_start and not experiment.coloured:
             # No start makes up for what is far more than noise.
@@ -142,18 +132,19 @@ def _tried(own: Sequence[_Own], names: Sequence[str]) -> list[FittedModels]:
                 for name, answer in answers.items()
                 if answer.misfit < most
             }
-        misfits = _misfits(growths[place], posed, answers)
-        tried = ranked([*answers], misfits, fit.problem.residuals.samples)
-        best = preferred(tried, chosen) or chosen
+        misfits = [_misfit(growth, posed[name], answer) for name, answer in answers.items()]
+        samples = diagnosis.likelihood.problem.residuals.samples
+        spared = tuple(name for name in names if name not in answers)
+        models = FittedModels(chosen, ranked([*answers], misfits, samples), answers, spared=spared)
+        best = models.preferred or chosen
         # What a fit leaves that is not rejected has been looked at.
         adequate = best == chosen and diagnosis.status != REJECTED
         adequate = adequate or _leaves_noise(experiment, posed[best], answers[best])
-        spared = tuple(name for name in names if name not in answers)
-        every.append(FittedModels(chosen, tried, answers, adequate, spared))
+        every.append(replace(models, adequate=adequate))
     return every
 
 
-def _worth(own: Sequence[_Own], growths: Sequence[Array | None]) -> Worth:
+def _worth(diagnoses: Sequence[Diagnosis], growths: Sequence[Array | None]) -> Worth:
     """Return what tells if a model of so many parameters could have a BIC that is clearly lowest.
 
     No linear sample fits better than the best of any, see `fit_any_sample`, at the start that was
@@ -161,21 +152,22 @@ def _worth(own: Sequence[_Own], growths: Sequence[Array | None]) -> Worth:
     believed where a model fits better.
     """
     least = [
-        None
-        if not experiment.usual_models or growth is not None
-        else fit_any_sample(fit.problem.residuals).misfit
-        for ((_, experiment), fit, _), growth in zip(own, growths, strict=True)
+        fit_any_sample(diagnosis.likelihood.problem.residuals).misfit
+        if diagnosis.identified[1].usual_models and growth is None
+        else np.inf
+        for diagnosis, growth in zip(diagnoses, growths, strict=True)
     ]
 
-    def worth(name: str, trace: int, found: Fits) -> bool:
-        (_, experiment), fit, diagnosis = own[trace]
-        chosen, limit = experiment.sample.candidate, least[trace]
-        misfits = {chosen: diagnosis.likelihood.misfit}
-        misfits |= {other: found[other][trace].misfit for other in found if trace in found[other]}
-        if name == chosen or limit is None or limit > min(misfits.values()) * (1 + _ROUNDING):
+    def worth(name: str, trace: int, fits: Fits) -> bool:
+        likelihood, limit = diagnoses[trace].likelihood, least[trace]
+        chosen = diagnoses[trace].identified[1].sample.candidate
+        misfits = {chosen: likelihood.misfit}
+        misfits |= {other: fits[other][trace].misfit for other in fits if trace in fits[other]}
+        if name == chosen or limit > min(misfits.values()) * (1 + _ROUNDING):
             return True
-        sizes = [len(CANDIDATES[each].model.names) for each in (name, *misfits)]
-        bic = aic_and_bic([limit, *misfits.values()], fit.problem.residuals.samples, sizes)[1]
+        sizes = [len(CANDIDATES[tried].model.names) for tried in (name, *misfits)]
+        samples = likelihood.problem.residuals.samples
+        bic = aic_and_bic([limit, *misfits.values()], samples, sizes)[1]
         return bool(bic[0] < np.min(bic[1:]) - levels.WORTH_A_MENTION)
 
     return worth
@@ -183,13 +175,9 @@ def _worth(own: Sequence[_Own], growths: Sequence[Array | None]) -> Worth:
 
 def _leaves_noise(experiment: Experiment, problem: TraceProblem, answer: Fit) -> bool:
     """Return True if what a model's fit leaves does not reject it."""
-    likelihood = make_likelihood(
-        problem,
-        within_range(answer.parameters, problem),
-        answer.misfit,
-        confidence=experiment.confidence,
-        noise_sd=experiment.noise_sd,
-    )
+    best, known = within_range(answer.parameters, problem), experiment.noise_sd
+    given = problem, best, answer.misfit
+    likelihood = make_likelihood(*given, confidence=experiment.confidence, noise_sd=known)
     _, find_notes = examine_residuals(likelihood)
     return compute_status(find_notes()) != REJECTED
 
@@ -205,77 +193,73 @@ def _growth(diagnosis: Diagnosis) -> Array | None:
     return growth if compare_extremes(growth) > levels.CLEARLY else None
 
 
-def _misfits(
-    growth: Array | None, problems: Mapping[str, TraceProblem], answers: Mapping[str, Fit]
-) -> list[float]:
-    """Return misfits of models; in noise that clearly grows of weighted fits, to first order."""
-    misfits = [answer.misfit for answer in answers.values()]
+def _misfit(growth: Array | None, problem: TraceProblem, answer: Fit) -> float:
+    """Return the misfit of a model; in noise that grows, of a weighted fit, to first order."""
     if growth is None:
-        return misfits
-    for place, (name, problem) in enumerate(problems.items()):
-        left, slopes = problem.residuals(within_range(answers[name].parameters, problem))
-        weighted = without(absorbed(slopes / growth), left / growth)
-        misfits[place] = float(np.sqrt(np.mean(weighted**2)))
-    return misfits
+        return answer.misfit
+    left, slopes = problem.residuals(within_range(answer.parameters, problem))
+    weighted = without(absorbed(slopes / growth), left / growth)
+    return float(np.sqrt(np.mean(weighted**2)))
 
 
 def _at_own_onset(
-    recording: Recording, experiment: Experiment, name: str, problem: TraceProblem, found: Fit
+    recording: Recording, experiment: Experiment, name: str, problem: TraceProblem, answer: Fit
 ) -> Fit:
     """Return a model's fit with the onset that it fits best with, beside that of the chosen one."""
     if name == experiment.sample.candidate:
-        return found
+        return answer
     other = replace(experiment, sample=CANDIDATES[name], fixed={})
     fits = OnsetFits(other, recording.time_s, recording.readings)
-    best = fits.near(fits.at(0.0, within_range(found.parameters, problem)))
-    if best.misfit >= found.misfit:
-        return found
-    return replace(found, parameters=np.exp(best.log_parameters), misfit=best.misfit)
+    best = fits.near(fits.at(0.0, within_range(answer.parameters, problem)))
+    if best.misfit >= answer.misfit:
+        return answer
+    return replace(answer, parameters=np.exp(best.log_parameters), misfit=best.misfit)
 
 
-_SAME_NETWORK = "liquid_drop", "zener_maxwell"
-
-
-def _candidates(experiment: Experiment, fit: TraceFit) -> tuple[str, ...]:
+def _candidates(diagnosis: Diagnosis) -> tuple[str, ...]:
     """Return the names of the models to fit to a trace, none if nothing is compared."""
+    experiment, residuals = diagnosis.identified[1], diagnosis.likelihood.problem.residuals
     if experiment.fixed:
         return ()
-    residuals, chosen = fit.problem.residuals, experiment.sample.candidate
+    chosen, usual = experiment.sample.candidate, experiment.instrument.has_jaws
     # One network has one name: that asked for, or else that which is usual for the instrument.
-    usual = "liquid_drop" if experiment.instrument.has_jaws else "zener_maxwell"
-    own = chosen if chosen in _SAME_NETWORK else usual
-    names = (own if it in _SAME_NETWORK else it for it in (*experiment.models, chosen))
-    every = dict.fromkeys(names)
+    network = chosen if chosen in _SAME_NETWORK else _SAME_NETWORK[0 if usual else 1]
+    every = [network if name in _SAME_NETWORK else name for name in (*experiment.models, chosen)]
     # With very many samples the dozens of modes of a springpot would take gigabytes.
     shortest_s, longest_s = experiment.torque.spread_s(residuals.trace.time_s)
     few = residuals.samples <= _MOST_SAMPLES and longest_s <= LONGEST_S * experiment.unit_s
-    few &= shortest_s >= SHORTEST_S * experiment.unit_s
-    if few and experiment.usual_models:
-        every |= dict.fromkeys(_POWER_LAWS)
-    most = _most(experiment, fit)
-    found = tuple(it for it in every if len(CANDIDATES[it].model.names) <= most or it == chosen)
-    return found if len(found) > 1 else ()
+    if few and shortest_s >= SHORTEST_S * experiment.unit_s and experiment.usual_models:
+        every += _POWER_LAWS
+    most = {name: len(CANDIDATES[name].model.names) <= _most(diagnosis) for name in every}
+    names = tuple(name for name, may_be in most.items() if may_be or name == chosen)
+    return names if len(names) > 1 else ()
 
 
-def _most(experiment: Experiment, fit: TraceFit) -> int:
+def _most(diagnosis: Diagnosis) -> int:
     """Return the most parameters of a model: one a reading leaves nothing to tell noise by."""
-    return fit.problem.residuals.free - experiment.fit_start - 1
+    fit_start = diagnosis.identified[1].fit_start
+    return diagnosis.likelihood.problem.residuals.free - fit_start - 1
 
 
-def judge_again(fit: TraceFit, diagnosis: Diagnosis, models: FittedModels) -> Diagnosis:
-    """Diagnose a trace again if its own model was fitted better, within the search range, since.
+def _judge_again(diagnosis: Diagnosis) -> Diagnosis:
+    """Diagnose a trace again if its model was fitted better, within the search range, since.
 
     Return the new diagnosis, or the one so far, with a note if the lower chi^2 is outside the
     range.
     """
-    own = models.answers.get(models.chosen)
-    if own is None or (increase := diagnosis.likelihood.increase(own.misfit)) > -levels.MISSED:
+    models, likelihood = diagnosis.models, diagnosis.likelihood
+    assert models is not None
+    answer = models.answers.get(models.chosen)
+    if answer is None or (increase := likelihood.increase(answer.misfit)) > -levels.MISSED:
         return diagnosis
-    if is_within(own.parameters, fit.problem):
+    if is_within(answer.parameters, likelihood.problem):
         # Models are compared by nine digits of their misfits: an optimum that is shown has all.
-        own = own.at(fit_from([fit.problem], np.log(own.parameters)))
-        return diagnose(fit.problem, own, confidence=diagnosis.likelihood.confidence)
-    gone = vanished(models.chosen, own)
+        answer = answer.at(fit_from([likelihood.problem], np.log(answer.parameters)))
+        again = diagnose(likelihood.problem, answer, confidence=likelihood.confidence)
+        recording, experiment = diagnosis.identified
+        judged = replace(again, recording=recording, experiment=experiment)
+        return replace(judged, fit=diagnosis.fit, models=models)
+    gone = vanished(models.chosen, answer)
     where = f", without {' and '.join(gone)}" if gone else ""
     text = (
         f"Outside the search range{where}, the model fits better: χ² is lower by "
@@ -284,7 +268,7 @@ def judge_again(fit: TraceFit, diagnosis: Diagnosis, models: FittedModels) -> Di
     return replace(diagnosis, notes=[*diagnosis.notes, Note(DOUBT, text)])
 
 
-def second_opinions(traces: Sequence[Trace], diagnoses: Sequence[Diagnosis]) -> list[list[Note]]:
+def second_opinions(diagnoses: Sequence[Diagnosis]) -> list[list[Note]]:
     """Fit an offset and a drift along, and warn if chi^2 falls more than by chance (`FALSE_ALARM`).
 
     If an offset alone explains as much, it is that; fits are those that the command would make if
@@ -292,35 +276,34 @@ def second_opinions(traces: Sequence[Trace], diagnoses: Sequence[Diagnosis]) -> 
     not rejected. None are tried if both are declared already, or if the noise model is coloured,
     which fits both. Nor is it said if BIC prefers another model by far more.
     """
-    notes: list[list[Note]] = [[] for _ in traces]
-    which = [
-        index
-        for index, (recording, experiment) in enumerate(traces)
-        if not experiment.instrument.sweeps
-        and not (experiment.coloured or (experiment.offset and experiment.drift))
-        and len(recording.time_s) > experiment.unknowns + _TERMS
-    ]
-    both = _better(traces, diagnoses, which, drift=True)
-    alone = [index for index in both if both[index].added > 1]
-    offsets = _better(traces, diagnoses, alone, drift=False)
+    notes: list[list[Note]] = [[] for _ in diagnoses]
+    which = []
+    for index, (recording, experiment) in enumerate(one.identified for one in diagnoses):
+        few = len(recording.time_s) <= experiment.unknowns + _TERMS
+        declared = experiment.coloured or (experiment.offset and experiment.drift)
+        if not (experiment.instrument.sweeps or declared or few):
+            which.append(index)
+    both = _better(diagnoses, which, drift=True)
+    alone = [index for index, other in both.items() if other.added > 1]
+    offsets = _better(diagnoses, alone, drift=False)
     for index, other in both.items():
-        one = offsets.get(index)
+        diagnosis, one = diagnoses[index], offsets.get(index)
         if one and chdtrc(1, max(other.fall - one.fall, 0.0)) >= levels.FALSE_ALARM:
             other = one
-        confidence = diagnoses[index].likelihood.confidence
+        confidence = diagnosis.likelihood.confidence
         judged = diagnose(other.fit.problem, other.fit.found, confidence=confidence)
-        terms = np.log(len(traces[index][0].time_s)) * other.added
-        models = diagnoses[index].models
-        led = models is not None and models.lead > other.fall - terms + levels.FAR_BETTER
-        if not (led or diagnoses[index].status == judged.status == REJECTED):
-            notes[index].append(_note(traces[index], diagnoses[index], other, judged))
+        terms = np.log(len(diagnosis.identified[0].time_s)) * other.added
+        assert diagnosis.models is not None
+        led = diagnosis.models.lead > other.fall - terms + levels.FAR_BETTER
+        if not (led or diagnosis.status == judged.status == REJECTED):
+            notes[index].append(_note(diagnosis, other, judged))
     return notes
 
 
 class _Other(NamedTuple):
     """A better fit with terms added: decrease of chi^2, its chance, and how many terms."""
 
-    trace: Trace
+    experiment: Experiment
     fit: TraceFit
     fall: float
     chance: float
@@ -328,66 +311,63 @@ class _Other(NamedTuple):
 
 
 def _better(
-    traces: Sequence[Trace], diagnoses: Sequence[Diagnosis], which: Sequence[int], *, drift: bool
+    diagnoses: Sequence[Diagnosis], which: Sequence[int], *, drift: bool
 ) -> dict[int, _Other]:
     """Return fits with an offset, or a drift, too, by index, if they are better."""
     if not which:
         return {}
-    also, found = [], {}
-    for recording, experiment in (traces[index] for index in which):
+    also, better = [], {}
+    for recording, experiment in (diagnoses[index].identified for index in which):
         # As if the user had declared them.
         declared = replace(experiment, offset=True, drift=drift or experiment.drift)
         also.append((recording, for_trace(declared, recording)))
-    for index, own, fit in zip(which, also, fits_of(also, silent), strict=True):
-        experiment, likelihood = traces[index][1], diagnoses[index].likelihood
-        fall = compute_fall(
-            fit.problem.residuals.samples,
-            likelihood.misfit,
-            fit.found.misfit,
-            likelihood.noise_sd if experiment.noise_sd is not None else None,
-        )
-        added = own[1].offset_and_drift - experiment.offset_and_drift
+    for index, (_, other), fit in zip(which, also, fits_of(also, silent), strict=True):
+        experiment, likelihood = diagnoses[index].identified[1], diagnoses[index].likelihood
+        known = likelihood.noise_sd if experiment.noise_sd is not None else None
+        misfits = likelihood.misfit, fit.found.misfit
+        fall = compute_fall(fit.problem.residuals.samples, *misfits, known)
+        added = other.offset_and_drift - experiment.offset_and_drift
         if (chance := float(chdtrc(added, max(fall, 0.0)))) < levels.FALSE_ALARM:
-            found[index] = _Other(own, fit, fall, chance, added)
-    return found
+            better[index] = _Other(other, fit, fall, chance, added)
+    return better
 
 
-def _note(trace: Trace, diagnosis: Diagnosis, other: _Other, judged: Diagnosis) -> Note:
+def _note(diagnosis: Diagnosis, other: _Other, judged: Diagnosis) -> Note:
     """Return the warning, with the verdicts that an offset and a drift would change."""
-    (recording, experiment), rejected = trace, diagnosis.status == REJECTED
+    (recording, experiment), rejected = diagnosis.identified, diagnosis.status == REJECTED
     # Characteristic times, at the end of the former, are not among the latter.
     changed = [
         f"{after.quantity.label} would be {after.words().removeprefix('determined: ')}"
         for before, after in zip(diagnosis.findings, judged.findings, strict=False)
         if _differ(before, after)
     ]
-    changes = "it is not rejected then" if rejected else "; ".join(changed)
-    drifts = other.trace[1].drift and not experiment.drift
+    drifts = other.experiment.drift and not experiment.drift
     # A constant and a line, if not both are declared already.
     many = drifts and not experiment.offset
-    better = f"{'explain' if many else 'explains'} the trace far better (χ² falls by "
+    better = f"fitted along, {'explain' if many else 'explains'} the trace far better (χ² falls by "
     better += f"{plain(other.fall)}, {p_value(other.chance)})"
     instrument, torque = experiment.instrument, experiment.torque
     controlled = instrument.controlled.name
+    same = f"Under this {controlled} both give the same"
     if drifts and drift_is_flow(torque, recording.time_s):
         text = (
-            f"A constant and a line in time, fitted along, {better}: the "
-            f"instrument drifts, or the sample flows. Under this {controlled} both give the same "
-            f"line, and the trace cannot tell which it is: a {controlled} that changes would."
+            f"A constant and a line in time, {better}: the instrument drifts, or the sample flows. "
+            f"{same} line, and the trace cannot tell which it is: a {controlled} that changes "
+            "would."
         )
     elif not drifts and is_held(torque, recording.time_s):
         yields = "holds a load" if instrument.deforms else "has an instantaneous compliance"
         text = (
-            f"A constant, fitted along, {better}: the instrument has an offset, or the sample "
-            f"{yields}. Under this {controlled} both give the same constant: readings before "
-            "loading would tell them apart."
+            f"A constant, {better}: the instrument has an offset, or the sample {yields}. {same} "
+            "constant: readings before loading would tell them apart."
         )
     else:
         terms = "An offset and a drift" if many else "A drift" if drifts else "An offset"
-        options = " --offset" * other.trace[1].offset + " --drift" * other.trace[1].drift
+        changes = "it is not rejected then" if rejected else "; ".join(changed)
+        options = " --offset" * other.experiment.offset + " --drift" * other.experiment.drift
         text = (
-            f"{terms} of the instrument, fitted along, {better}: {changes or 'no verdict changes'}."
-            f" If the instrument may have that, identify the trace with{options}."
+            f"{terms} of the instrument, {better}: {changes or 'no verdict changes'}. If the "
+            f"instrument may have that, identify the trace with{options}."
         )
         if drifts and not instrument.deforms:
             text += (

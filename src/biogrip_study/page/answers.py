@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from biogrip.digits import legible, plain, with_unit
-from biogrip.fit.nested_fits import FittedModel, advice, fits_far_better, preferred
+from biogrip.fit.nested_fits import FittedModels
 from biogrip.judging.doubts import DOUBTFUL, OK, REJECTED
 from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
 from biogrip.physics.models import CANDIDATES
@@ -73,19 +73,16 @@ def say_which_model_is_better(
     title: none is better. None is simpler and as good if the own fit is rejected.
     """
     names = {sample.model.title: name for name, sample in CANDIDATES.items()}
-    tried = [
-        FittedModel(
-            names[row["model"]], *(float(row[f"median_delta_{name}"]) for name in _CRITERIA)
-        )
+    tried = {
+        names[row["model"]]: (float(row["median_delta_aic"]), float(row["median_delta_bic"]))
         for row in models
         if row["case"] == case and row["model"] in names
-    ]
-    judge = fits_far_better if fit == REJECTED else preferred
-    known = any(model.candidate == candidate for model in tried)
-    return advice(tried, candidate) if known and judge(tried, candidate) else ""
+    }
+    fitted = FittedModels(candidate, tried)
+    other = fitted.far_better if fit == REJECTED else fitted.preferred
+    return fitted.advice() if candidate in tried and other else ""
 
 
-_CRITERIA = "aic", "bic"
 _VERBS = {
     DETERMINED: "determines",
     BOUNDED_BELOW: "bounds from below only",
