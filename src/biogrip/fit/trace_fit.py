@@ -17,14 +17,15 @@ from biogrip.digits import counted, rounded
 from biogrip.fit.experiment import Experiment, pose
 from biogrip.fit.least_squares import fit_from, identify_many
 from biogrip.fit.nested_fits import deepen
-from biogrip.fit.noise_model_fit import (
+from biogrip.fit.problem import Fit, ReportProgress, TraceProblem, silent
+from biogrip.fit.trace_noise import (
+    NoiseModel,
     NoiseModelLikelihood,
     absorbed,
     growth_left,
     outliers_of,
 )
-from biogrip.fit.problem import Fit, ReportProgress, TraceProblem, silent
-from biogrip.physics.noise import NoiseModel, drift_is_flow
+from biogrip.physics.noise import drift_is_flow
 from biogrip.physics.protocol import Phase, join_phases
 from biogrip.physics.simulation import simulated_response
 

@@ -18,9 +18,9 @@ from biogrip.digits import plain
 from biogrip.fit.any_sample import fit_responses, spread_lags
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import identify_many
-from biogrip.fit.noise_model_fit import absorbed
 from biogrip.fit.problem import silent
 from biogrip.fit.trace_fit import contact_function
+from biogrip.fit.trace_noise import absorbed
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.judging.doubts import DOUBT, REJECTED, REJECTION, Note
 from biogrip.physics.modes import lag_course

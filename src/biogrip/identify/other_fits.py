@@ -33,9 +33,9 @@ from biogrip.fit.nested_fits import (
     vanished,
     within_range,
 )
-from biogrip.fit.noise_model_fit import absorbed, compare_extremes, growth_left
 from biogrip.fit.problem import Fit, ReportProgress, TraceProblem, silent
 from biogrip.fit.trace_fit import TraceFit, fit_least_squares
+from biogrip.fit.trace_noise import absorbed, compare_extremes, growth_left
 from biogrip.identify.prepare import flow_of, for_trace
 from biogrip.judging.diagnosis import Diagnosis, diagnose
 from biogrip.judging.doubts import (

@@ -20,7 +20,6 @@ import biogrip.levels as levels
 from biogrip.arrays import Array
 from biogrip.digits import plain
 from biogrip.errors import BiogripError
-from biogrip.fit.any_sample import proportional_deviations
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.problem import GeneRange
 from biogrip.identify.plausibility import check_moduli, check_recording
@@ -175,6 +174,8 @@ def _checked(trace: Recording, experiment: Experiment) -> Recording:
         trace = replace(trace, remarks_before=(*trace.remarks_before, suspicion))
     if share is None:
         return trace
+    from biogrip.fit.share_noise import proportional_deviations
+
     return replace(trace, sd=proportional_deviations(experiment, trace.time_s, trace.readings))
 
 
@@ -184,7 +185,7 @@ def _with_deviations(sweep: Recording, experiment: Experiment) -> Recording:
     if (known := noise_sd if sweep.sd is None and share is None else sweep.sd) is not None:
         check_moduli(sweep, known)
         return sweep
-    from biogrip.fit.swept_noise import estimate_swept_noise
+    from biogrip.fit.share_noise import estimate_swept_noise
 
     sizes = [size for size in (share, sweep.read.phase_sd_rad) if size is not None]
     noise = estimate_swept_noise(sweep.time_s, sweep.readings, sizes or None, noise_sd or 0.0)
