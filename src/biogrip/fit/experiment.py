@@ -1,6 +1,6 @@
 """What was done with a sample, which all traces of a case share."""
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -127,6 +127,11 @@ class Experiment:
         """Unit of time in which power laws hold as long as the protocol lasts."""
         lasts = 1.0 if self.instrument.sweeps else sum(phase.duration_s for phase in self.phases)
         return lasts if lasts < _SHORT_S else max(lasts / LONGEST_S, 1.0)
+
+    def without_terms(self, names: Collection[str]) -> "Experiment":
+        """Leave out an ``offset``, or a ``drift``, of the instrument."""
+        offset, drift = self.offset and "offset" not in names, self.drift and "drift" not in names
+        return replace(self, offset=offset, drift=drift)
 
     def to_identify(self, *others: SampleModel) -> "Experiment":
         """Leave out noise model, gripper uncertainty, and ranges neither it nor `others` use."""

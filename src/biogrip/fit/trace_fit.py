@@ -25,7 +25,6 @@ from biogrip.fit.trace_noise import (
     growth_left,
     outliers_of,
 )
-from biogrip.physics.noise import drift_is_flow
 from biogrip.physics.protocol import Phase, join_phases
 from biogrip.physics.simulation import simulated_response
 
@@ -190,8 +189,6 @@ class TraceFit:
     """True for readings that were left out, (n_samples,)."""
     errors: tuple[float, float] = (0.0, 0.0)
     """Standard deviations of logarithms of the noise model: of its time, and of its walk's odds."""
-    fitted_along: str = ""
-    """Terms of the instrument that were fitted along, in words."""
 
     def noise_data(self) -> dict[str, float | None] | None:
         """Return the estimated noise model as plain data; None if noise was assumed white."""
@@ -221,8 +218,7 @@ class TraceFit:
             f"{100 * n:.0f} % {what}" for what, n in others.items() if n >= levels.WORTH_SAYING
         ]
         said = [
-            f"Noise model: of the variance {', '.join(parts)};{self.fitted_along} "
-            "the intervals allow for all of it."
+            f"Noise model: of the variance {', '.join(parts)}; the intervals allow for all of it."
         ]
         if left_out:
             samples = counted(left_out, "sample")
@@ -272,19 +268,7 @@ def _fit_in_noise(experiment: Experiment, time_s: Array, readings: Array, find: 
     (other,) = find([problem])
     if np.float32(other.misfit) < np.float32(best_fit.misfit):
         best_fit = other
-    along = _terms_fitted_along(experiment, time_s)
-    return TraceFit(problem, best_fit, noise_model, ~kept, errors, along)
-
-
-def _terms_fitted_along(experiment: Experiment, time_s: Array) -> str:
-    terms = ["an offset"] * experiment.offset + ["a drift"] * experiment.drift
-    if not terms:
-        return ""
-    controlled = experiment.instrument.controlled.name
-    or_flow = f" (or the sample flows: under this {controlled} both give the same line)"
-    doubt = or_flow if experiment.drift and drift_is_flow(experiment.torque, time_s) else ""
-    verb = "are" if len(terms) > 1 else "is"
-    return f" {' and '.join(terms)} of the instrument{doubt} {verb} fitted along, and"
+    return TraceFit(problem, best_fit, noise_model, ~kept, errors)
 
 
 def _without_outliers(

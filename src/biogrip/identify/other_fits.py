@@ -17,7 +17,6 @@ import numpy as np
 from scipy.special import chdtrc
 
 import biogrip.levels as levels
-from biogrip.arrays import Array
 from biogrip.digits import p_value, plain
 from biogrip.fit.any_sample import fit_any_sample
 from biogrip.fit.experiment import Experiment
@@ -35,7 +34,7 @@ from biogrip.fit.nested_fits import (
 )
 from biogrip.fit.problem import Fit, ReportProgress, TraceProblem, silent
 from biogrip.fit.trace_fit import TraceFit, fit_least_squares
-from biogrip.fit.trace_noise import absorbed, compare_extremes, growth_left
+from biogrip.fit.trace_noise import compare_extremes, growth_left
 from biogrip.identify.prepare import flow_of, for_trace
 from biogrip.judging.diagnosis import Diagnosis, diagnose
 from biogrip.judging.doubts import (
@@ -48,11 +47,10 @@ from biogrip.judging.doubts import (
     examine_residuals,
 )
 from biogrip.judging.likelihood import compute_fall, make_likelihood
-from biogrip.judging.onset import OnsetFits
 from biogrip.judging.verdicts import Finding
 from biogrip.physics.fractional import LONGEST_S, SHORTEST_S
 from biogrip.physics.models import CANDIDATES
-from biogrip.physics.noise import drift_is_flow, without
+from biogrip.physics.noise import drift_is_flow
 from biogrip.physics.protocol import is_held
 from biogrip.traces.reader import Recording
 
@@ -116,46 +114,35 @@ def _tried(diagnoses: Sequence[Diagnosis], names: Sequence[str]) -> list[FittedM
         problems[name] = [which.for_model(one.likelihood.problem, model) for one, which in pairs]
         streams[name] = [which.stream(f"model {name}") for _, which in pairs]
     near = {chosen: np.array([diagnosis.likelihood.best for diagnosis in diagnoses])}
-    growths = [*map(_growth, diagnoses)]
-    worth = _worth(diagnoses, growths)
-    fits = fit_models(problems, first.least_squares, streams, near=near, worth=worth)
+    given = problems, first.least_squares, streams
+    fits = fit_models(*given, near=near, worth=_worth(diagnoses))
     every = []
-    for place, (diagnosis, growth) in enumerate(zip(diagnoses, growths, strict=True)):
-        recording, experiment = diagnosis.identified
+    for place, diagnosis in enumerate(diagnoses):
         answers = {name: fits[name][place] for name in names if place in fits[name]}
-        posed = {name: problems[name][place] for name in answers}
-        if experiment.fit_start and not experiment.coloured:
-            # No start makes up for what is far more than noise.
-            most = levels.WHITE * min(answer.misfit for answer in answers.values())
-            answers |= {
-                name: _at_own_onset(recording, experiment, name, posed[name], answer)
-                for name, answer in answers.items()
-                if answer.misfit < most
-            }
-        misfits = [_misfit(growth, posed[name], answer) for name, answer in answers.items()]
+        misfits = [answer.misfit for answer in answers.values()]
         samples = diagnosis.likelihood.problem.residuals.samples
         spared = tuple(name for name in names if name not in answers)
         models = FittedModels(chosen, ranked([*answers], misfits, samples), answers, spared=spared)
         best = models.preferred or chosen
         # What a fit leaves that is not rejected has been looked at.
         adequate = best == chosen and diagnosis.status != REJECTED
-        adequate = adequate or _leaves_noise(experiment, posed[best], answers[best])
+        adequate = adequate or _leaves_noise(problems[best][place], answers[best], diagnosis)
         every.append(replace(models, adequate=adequate))
     return every
 
 
-def _worth(diagnoses: Sequence[Diagnosis], growths: Sequence[Array | None]) -> Worth:
+def _worth(diagnoses: Sequence[Diagnosis]) -> Worth:
     """Return what tells if a model of so many parameters could have a BIC that is clearly lowest.
 
     No linear sample fits better than the best of any, see `fit_any_sample`, at the start that was
-    fitted. That is not asked where the config names the models or misfits are weighted, nor
-    believed where a model fits better.
+    fitted. That is not asked where the config names the models, nor believed where a model fits
+    better.
     """
     least = [
         fit_any_sample(diagnosis.likelihood.problem.residuals).misfit
-        if diagnosis.identified[1].usual_models and growth is None
+        if diagnosis.identified[1].usual_models
         else np.inf
-        for diagnosis, growth in zip(diagnoses, growths, strict=True)
+        for diagnosis in diagnoses
     ]
 
     def worth(name: str, trace: int, fits: Fits) -> bool:
@@ -173,53 +160,30 @@ def _worth(diagnoses: Sequence[Diagnosis], growths: Sequence[Array | None]) -> W
     return worth
 
 
-def _leaves_noise(experiment: Experiment, problem: TraceProblem, answer: Fit) -> bool:
+def _leaves_noise(problem: TraceProblem, answer: Fit, diagnosis: Diagnosis) -> bool:
     """Return True if what a model's fit leaves does not reject it."""
-    best, known = within_range(answer.parameters, problem), experiment.noise_sd
+    best, experiment = within_range(answer.parameters, problem), diagnosis.identified[1]
+    confidence, noise_sd = experiment.confidence, experiment.noise_sd
     given = problem, best, answer.misfit
-    likelihood = make_likelihood(*given, confidence=experiment.confidence, noise_sd=known)
+    likelihood = make_likelihood(*given, confidence=confidence, noise_sd=noise_sd)
     _, find_notes = examine_residuals(likelihood)
     return compute_status(find_notes()) != REJECTED
 
 
-def _growth(diagnosis: Diagnosis) -> Array | None:
-    """Return the growth of the noise with the response, of each reading, if it clearly grows.
-
-    Noise that grows by a rejected fit is its misfit.
-    """
-    if diagnosis.status == REJECTED:
-        return None
-    growth = growth_left(diagnosis.likelihood.problem.residuals, diagnosis.likelihood.best)
-    return growth if compare_extremes(growth) > levels.CLEARLY else None
-
-
-def _misfit(growth: Array | None, problem: TraceProblem, answer: Fit) -> float:
-    """Return the misfit of a model; in noise that grows, of a weighted fit, to first order."""
-    if growth is None:
-        return answer.misfit
-    left, slopes = problem.residuals(within_range(answer.parameters, problem))
-    weighted = without(absorbed(slopes / growth), left / growth)
-    return float(np.sqrt(np.mean(weighted**2)))
-
-
-def _at_own_onset(
-    recording: Recording, experiment: Experiment, name: str, problem: TraceProblem, answer: Fit
-) -> Fit:
-    """Return a model's fit with the onset that it fits best with, beside that of the chosen one."""
-    if name == experiment.sample.candidate:
-        return answer
-    other = replace(experiment, sample=CANDIDATES[name], fixed={})
-    fits = OnsetFits(other, recording.time_s, recording.readings)
-    best = fits.near(fits.at(0.0, within_range(answer.parameters, problem)))
-    if best.misfit >= answer.misfit:
-        return answer
-    return replace(answer, parameters=np.exp(best.log_parameters), misfit=best.misfit)
+def _grows(diagnosis: Diagnosis) -> bool:
+    """Return True if noise clearly grows with the response; of a rejected fit that is misfit."""
+    likelihood = diagnosis.likelihood
+    growth = growth_left(likelihood.problem.residuals, likelihood.best)
+    return diagnosis.status != REJECTED and compare_extremes(growth) > levels.CLEARLY
 
 
 def _candidates(diagnosis: Diagnosis) -> tuple[str, ...]:
-    """Return the names of the models to fit to a trace, none if nothing is compared."""
+    """Return the names of the models to fit to a trace, none if nothing is compared.
+
+    Misfits of noise that grows tell nothing before it is weighted, which a note on it advises.
+    """
     experiment, residuals = diagnosis.identified[1], diagnosis.likelihood.problem.residuals
-    if experiment.fixed:
+    if experiment.fixed or _grows(diagnosis):
         return ()
     chosen, usual = experiment.sample.candidate, experiment.instrument.has_jaws
     # One network has one name: that asked for, or else that which is usual for the instrument.
@@ -352,8 +316,7 @@ def _note(diagnosis: Diagnosis, other: _Other, judged: Diagnosis) -> Note:
     if drifts and drift_is_flow(torque, recording.time_s):
         text = (
             f"A constant and a line in time, {better}: the instrument drifts, or the sample flows. "
-            f"{same} line, and the trace cannot tell which it is: a {controlled} that changes "
-            "would."
+            f"{same} line: a {controlled} that changes would tell them apart."
         )
     elif not drifts and is_held(torque, recording.time_s):
         yields = "holds a load" if instrument.deforms else "has an instantaneous compliance"
@@ -369,11 +332,6 @@ def _note(diagnosis: Diagnosis, other: _Other, judged: Diagnosis) -> Note:
             f"{terms} of the instrument, {better}: {changes or 'no verdict changes'}. If the "
             f"instrument may have that, identify the trace with{options}."
         )
-        if drifts and not instrument.deforms:
-            text += (
-                f" Or the sample flows: as long as the {controlled} is constant, a drift and a "
-                "damper without a spring give the same line."
-            )
     weight = DOUBT if changed else HARMLESS
     return Note(REJECTION if rejected else weight, text)
 
@@ -400,12 +358,10 @@ def note_saturated(recording: Recording, experiment: Experiment) -> Iterator[Not
     values, counts = np.unique(recording.readings[recording.time_s > 0], return_counts=True)
     if len(values) < levels.FEWEST_VALUES:
         return
-    unit, least = f" {experiment.instrument.read.unit}".rstrip(), levels.SATURATED * np.sum(counts)
-    for end, at, near in (
-        ("largest", -1, counts[-levels.FEWEST_VALUES : -1]),
-        ("smallest", 0, counts[1 : levels.FEWEST_VALUES]),
-    ):
-        if counts[at] > max(least, levels.MORE_OFTEN * np.max(near)):
+    unit = f" {experiment.instrument.read.unit}".rstrip()
+    for end, at, near in (("largest", -1, counts[::-1]), ("smallest", 0, counts)):
+        others = levels.MORE_OFTEN * np.max(near[1 : levels.FEWEST_VALUES])
+        if counts[at] > max(levels.SATURATED * np.sum(counts), others):
             yield Note(
                 DOUBT,
                 f"{counts[at]} of {np.sum(counts)} readings are exactly the {end}, "
