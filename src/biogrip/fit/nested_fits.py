@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike
 import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray
 from biogrip.digits import counted, plain
-from biogrip.fit.least_squares import LeastSquaresSettings, fit_from, identify_many
+from biogrip.fit.least_squares import LeastSquaresSettings, fit_from, identify_many, refit
 from biogrip.fit.problem import Fit, TraceProblem, silent
 from biogrip.physics.models import CANDIDATES, as_richer, contained, different_in
 
@@ -197,7 +197,7 @@ def _is_noticeably_lower(misfit: float, than: float, problem: TraceProblem) -> b
 
 def _better_from(answer: Fit, problem: TraceProblem, start: Array) -> Fit:
     """Return the fit from a start if its misfit is lower, or else the answer itself."""
-    again = answer.at(fit_from([problem], start))
+    again = refit(answer, problem, start)
     return again if _digits(again.misfit) < _digits(answer.misfit) else answer
 
 

@@ -15,7 +15,7 @@ import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.digits import counted, rounded
 from biogrip.fit.experiment import Experiment, pose
-from biogrip.fit.least_squares import fit_from, identify_many
+from biogrip.fit.least_squares import identify_many, refit
 from biogrip.fit.nested_fits import deepen
 from biogrip.fit.problem import Fit, ReportProgress, TraceProblem, silent
 from biogrip.fit.trace_noise import (
@@ -324,9 +324,10 @@ def _in_turn(
             noise_model = likelihood.best(near=before)
         condensed = experiment.in_noise(time_s, noise_model, uncertain / noise_sd, growing=growing)
         problem = experiment.of(time_s, readings, condensed=condensed)
-        best_fit = best_fit.at(fit := fit_from([problem], start))
-        slopes = problem.residuals.condensed_responses(fit.x)[0, 1:]
-        moved = np.linalg.norm((fit.x[0] - start) @ slopes) / noise_sd
+        best_fit = refit(best_fit, problem, start)
+        end = np.log(best_fit.parameters)
+        slopes = problem.residuals.condensed_responses(end[None])[0, 1:]
+        moved = np.linalg.norm((end - start) @ slopes) / noise_sd
         if moved < _FIT_SETTLED and _has_settled(before, noise_model):
             break
     errors = 0.0, 0.0

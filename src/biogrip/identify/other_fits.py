@@ -20,7 +20,7 @@ import biogrip.levels as levels
 from biogrip.digits import p_value, plain
 from biogrip.fit.any_sample import fit_any_sample
 from biogrip.fit.experiment import Experiment
-from biogrip.fit.least_squares import fit_from
+from biogrip.fit.least_squares import refit
 from biogrip.fit.nested_fits import (
     Fits,
     FittedModels,
@@ -218,7 +218,7 @@ def _judge_again(diagnosis: Diagnosis) -> Diagnosis:
         return diagnosis
     if is_within(answer.parameters, likelihood.problem):
         # Models are compared by nine digits of their misfits: an optimum that is shown has all.
-        answer = answer.at(fit_from([likelihood.problem], np.log(answer.parameters)))
+        answer = refit(answer, likelihood.problem, np.log(answer.parameters))
         again = diagnose(likelihood.problem, answer, confidence=likelihood.confidence)
         recording, experiment = diagnosis.identified
         judged = replace(again, recording=recording, experiment=experiment)
