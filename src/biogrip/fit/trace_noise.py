@@ -285,11 +285,12 @@ def whitened_rows(
         Of the noise of both moduli of a sweep, whose standard deviations are `growing`.
     """
     rows = SweptRows if course.sweeps else Condensed
+    uncertain = nuisance[:0] if uncertain is None else uncertain
     given = course, course.snapped(time_s)
     if correlation is not None and growing is not None:
         return rows(*given, nuisance[:0], PairWhitening(time_s, growing, correlation))
     if noise is None:
-        return rows(*given, nuisance if uncertain is None else with_uncertain(nuisance, uncertain))
+        return rows(*given, with_uncertain(nuisance, uncertain))
     return rows(*given, nuisance[:0], Whitening(time_s, noise, nuisance, uncertain, growing))
 
 
