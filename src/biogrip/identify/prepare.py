@@ -41,6 +41,9 @@ from biogrip.physics.protocol import SWEEP, Course, evaluate, is_held, largest_l
 from biogrip.traces.columns import TIME_UNITS, place
 from biogrip.traces.reader import Recording
 
+Trace = tuple[Recording, Experiment]
+"""A recording and the experiment that it is of, as `prepare` returns them."""
+
 # Largest ratio of trace to noise that widens a range, and a margin, for scales are rough.
 _CLEAREST, _MARGIN = 1e5, 10.0
 # Smallest and largest exponents of ten of search ranges.
@@ -74,7 +77,7 @@ def flow_of(experiment: Experiment) -> str:
     return _FLOWS.get(experiment.model.name, "")
 
 
-def prepare(recording: Recording, experiment: Experiment) -> tuple[Recording, Experiment]:
+def prepare(recording: Recording, experiment: Experiment) -> Trace:
     """Return a recording from the protocol's start on, and the experiment with what follows of it.
 
     A `BiogripError` has file, line and column of what is impossible with instrument and protocol.
