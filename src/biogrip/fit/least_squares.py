@@ -36,7 +36,7 @@ from typing import Annotated, Any, Protocol, Self
 import numpy as np
 from pydantic import Field
 
-from biogrip.arrays import Array, BoolArray, IntArray, parts
+from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.errors import BiogripError
 from biogrip.fit.problem import Fit, History, HistoryRow, ReportProgress, TraceProblem, silent
 from biogrip.keys import Block
@@ -306,8 +306,6 @@ grid of `minimize`, a thousandth of a standard deviation, ends most fits."""
 
 # Most steps of fair fits with a quantity held.
 _MOST_FAIR_STEPS = 40
-# Most numbers in the rows that are formed at once.
-_ROW_NUMBERS_AT_ONCE = 300_000
 
 
 def alike(problems: Sequence[TraceProblem]) -> list[IntArray]:
@@ -338,17 +336,10 @@ class LocalFits:
     def normal(self, x: Array, trace: IntArray) -> Normal:
         """Return the normal equations of the residuals, in units of the noise, and the prior.
 
-        Log-parameters are (n, n_parameters), each for a trace.
+        Log-parameters are (n, n_parameters), each for a trace. They are infinite where there is no
+        response.
         """
-        at_once = max(1, _ROW_NUMBERS_AT_ONCE // (self._traces.shape[1] * (1 + x.shape[1])))
-        normals = [
-            self._normal_of(self._residuals.condensed_responses(x[some]), x[some], trace[some])
-            for some in parts(max(len(x), 1), at_once)
-        ]
-        return Normal.joined(normals) if len(normals) > 1 else normals[0]
-
-    def _normal_of(self, rows: Array, x: Array, trace: IntArray) -> Normal:
-        """Return normal equations from rows of responses; infinite where there is no response."""
+        rows = self._residuals.condensed_responses(x)
         answered = np.isfinite(rows[:, 0, 0])
         rows[~answered] = 0.0
         rows[:, 0] -= self._traces[trace]
