@@ -199,6 +199,18 @@ def test_a_late_start_is_advised_with_its_limits_and_its_rows_tell_the_zero() ->
     assert f"({low:.2f} to {high:.2f}) of the clock, as fitted" in str(found)
 
 
+@pytest.mark.nightly
+def test_models_are_compared_each_at_its_own_onset() -> None:
+    """At that of one without a power law, a third branch would seem the best."""
+    times = np.arange(0, 60, 0.5)
+    values = np.where(times > 5, np.clip(times - 5, 1e-9, None) ** 0.32, 0.0)
+    values += 0.02 * np.random.default_rng(4).standard_normal(len(times))
+    models = ["kelvin_voigt", "zener_kelvin", "springpot"]
+    found = told(times, values, models, start="fit", reads="strain", model=models[0], hold=1.0)
+    misfits = {row["model"]: row["misfit_rad"] for row in found.data["models"]}
+    assert misfits["springpot"] == pytest.approx(0.02, rel=0.15)
+
+
 HOLD = np.arange(0.4, 44, 0.4)
 
 

@@ -17,7 +17,7 @@ The command, the library and the rules of a study all do this. Traces of the sam
 are fitted together; the result of a trace is the same, to the last bit, in any batch and alone.
 """
 
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -27,23 +27,24 @@ from scipy.special import chdtrc
 import biogrip.fit.nested_fits as nested_fits
 import biogrip.judging.doubts as doubts
 import biogrip.levels as levels
+from biogrip.arrays import Array
 from biogrip.digits import counted, p_value, plain
 from biogrip.fit.any_sample import fit_any_sample
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import refit
 from biogrip.fit.problem import Fit, ReportProgress, TraceProblem, silent
 from biogrip.fit.trace_fit import TraceFit, fit_least_squares
-from biogrip.fit.trace_noise import compare_extremes, growth_left
+from biogrip.fit.trace_noise import absorbed, compare_extremes, growth_left
 from biogrip.identify.prepare import Trace, flow_of, for_trace, prepare
 from biogrip.judging.diagnosis import Diagnosis, diagnose, diagnose_all, with_times
 from biogrip.judging.doubts import DOUBT, HARMLESS, REJECTED, REJECTION, Note
 from biogrip.judging.likelihood import compute_fall, make_likelihood
 from biogrip.judging.linearity import notes_on_gains
-from biogrip.judging.onset import notes_on_start, profile_over_onset
+from biogrip.judging.onset import OnsetFits, notes_on_start, profile_over_onset
 from biogrip.judging.verdicts import Finding
 from biogrip.physics.fractional import LONGEST_S, SHORTEST_S
 from biogrip.physics.models import CANDIDATES
-from biogrip.physics.noise import drift_is_flow
+from biogrip.physics.noise import drift_is_flow, rms, without
 from biogrip.physics.protocol import is_held
 from biogrip.traces.reader import Recording
 
@@ -98,14 +99,12 @@ def identify_alike(
     doing(f"fitting {counted(count, 'sample')}")
     fits = _fits_of(traces, progress)
     doing("finding confidence limits")
-    judged = diagnose_all(
-        [fit.problem for fit in fits],
-        [fit.found for fit in fits],
-        confidence=first.confidence,
-    )
+    given = [fit.problem for fit in fits], [fit.found for fit in fits]
     judged = [
         replace(diagnosis, recording=recording, experiment=experiment, fit=fit)
-        for diagnosis, (recording, experiment), fit in zip(judged, traces, fits, strict=True)
+        for diagnosis, (recording, experiment), fit in zip(
+            diagnose_all(*given, confidence=first.confidence), traces, fits, strict=True
+        )
     ]
     if not first.simulated:
         doing("trying other sample models")
@@ -118,8 +117,8 @@ def identify_alike(
     notes = [_notes_on_fit(*pair) for pair in zip(fits, experiments, strict=True)]
     if not first.simulated:
         opinions = _second_opinions(judged)
-        given = zip(judged, notes, opinions, strict=True)
-        notes = [[*_notes_on_trace(*of_trace)] for of_trace in given]
+        every = zip(judged, notes, opinions, strict=True)
+        notes = [[*_notes_on_trace(*of_trace)] for of_trace in every]
     pairs = zip(judged, notes, strict=True)
     return [replace(diagnosis, notes=[*diagnosis.notes, *more]) for diagnosis, more in pairs]
 
@@ -188,17 +187,14 @@ def _compare_models(diagnoses: Sequence[Diagnosis]) -> list[Diagnosis]:
     Best fits so far are among the starts. Branches are added until a further one does not help. Of
     the usual models those are spared that cannot suit the trace better than one that is fitted.
     """
-    chosen = diagnoses[0].identified[1].sample.candidate
-    compared = [
-        replace(diagnosis, models=nested_fits.FittedModels(chosen)) for diagnosis in diagnoses
-    ]
+    models = nested_fits.FittedModels(diagnoses[0].identified[1].sample.candidate)
+    compared = [replace(diagnosis, models=models) for diagnosis in diagnoses]
     names = [*map(_candidates, compared)]
     while left := dict.fromkeys(filter(None, names)):
         for some in left:
             which = [trace for trace, of_trace in enumerate(names) if of_trace == some]
-            for trace, models in zip(
-                which, _tried([compared[i] for i in which], some), strict=True
-            ):
+            tried = _tried([compared[trace] for trace in which], some)
+            for trace, models in zip(which, tried, strict=True):
                 compared[trace] = replace(compared[trace], models=models)
                 more = _one_branch_more(compared[trace], models)
                 names[trace] = (*some, more) if more else ()
@@ -215,44 +211,67 @@ def _one_branch_more(diagnosis: Diagnosis, models: nested_fits.FittedModels) -> 
 
 def _tried(diagnoses: Sequence[Diagnosis], names: Sequence[str]) -> list[nested_fits.FittedModels]:
     """Fit sample models to traces that were diagnosed by the chosen one."""
-    first, chosen = diagnoses[0].identified[1], diagnoses[0].identified[1].sample.candidate
-    problems, streams = {}, {}
+    experiments = [diagnosis.identified[1] for diagnosis in diagnoses]
+    posed = [diagnosis.likelihood.problem for diagnosis in diagnoses]
+    chosen, problems, streams = experiments[0].sample.candidate, {}, {}
     for name in names:
-        model, pairs = CANDIDATES[name].model, [(one, one.identified[1]) for one in diagnoses]
-        problems[name] = [which.for_model(one.likelihood.problem, model) for one, which in pairs]
-        streams[name] = [which.stream(f"model {name}") for _, which in pairs]
+        pairs, model = zip(experiments, posed, strict=True), CANDIDATES[name].model
+        problems[name] = [experiment.for_model(problem, model) for experiment, problem in pairs]
+        streams[name] = [experiment.stream(f"model {name}") for experiment in experiments]
     near = {chosen: np.array([diagnosis.likelihood.best for diagnosis in diagnoses])}
-    given = problems, first.least_squares, streams
-    fits = nested_fits.fit_models(*given, near=near, worth=_worth(diagnoses))
+    given, growths = (problems, experiments[0].least_squares, streams), [*map(_growth, diagnoses)]
+    fits = nested_fits.fit_models(*given, near=near, worth=_worth(diagnoses, growths))
     every = []
     for place, diagnosis in enumerate(diagnoses):
-        answers = {name: fits[name][place] for name in names if place in fits[name]}
-        misfits = [answer.misfit for answer in answers.values()]
-        samples = diagnosis.likelihood.problem.residuals.samples
+        of_trace = {name: problems[name][place] for name in names if place in fits[name]}
+        answers = {name: fits[name][place] for name in of_trace}
+        if experiments[place].fit_start and not experiments[place].coloured:
+            answers = _at_their_onsets(diagnosis, of_trace, answers)
+        misfits = [_misfit(growths[place], of_trace[name], answers[name]) for name in answers]
+        tried = nested_fits.ranked([*answers], misfits, posed[place].residuals.samples)
         spared = tuple(name for name in names if name not in answers)
-        models = nested_fits.FittedModels(
-            chosen, nested_fits.ranked([*answers], misfits, samples), answers, spared=spared
-        )
+        models = nested_fits.FittedModels(chosen, tried, answers, spared=spared)
         best = models.preferred or chosen
         # What a fit leaves that is not rejected has been looked at.
         adequate = best == chosen and diagnosis.status != REJECTED
-        adequate = adequate or _leaves_noise(problems[best][place], answers[best], diagnosis)
+        adequate = adequate or _leaves_noise(of_trace[best], answers[best], diagnosis)
         every.append(replace(models, adequate=adequate))
     return every
 
 
-def _worth(diagnoses: Sequence[Diagnosis]) -> nested_fits.Worth:
+def _at_their_onsets(
+    diagnosis: Diagnosis, problems: Mapping[str, TraceProblem], answers: Mapping[str, Fit]
+) -> dict[str, Fit]:
+    """Return fits of models with the onset that each fits best with; that of the chosen is known.
+
+    No start makes up for what is far more than noise.
+    """
+    (recording, experiment), best = diagnosis.identified, dict(answers)
+    most = levels.WHITE * min(answer.misfit for answer in answers.values())
+    for name, answer in answers.items():
+        if name == experiment.sample.candidate or answer.misfit >= most:
+            continue
+        other = replace(experiment, sample=CANDIDATES[name], fixed={})
+        fits = OnsetFits(other, recording.time_s, recording.readings)
+        start = nested_fits.within_range(answer.parameters, problems[name])
+        fit = fits.near(fits.at(0.0, start))
+        if fit.misfit < answer.misfit:
+            best[name] = replace(answer, parameters=np.exp(fit.log_parameters), misfit=fit.misfit)
+    return best
+
+
+def _worth(diagnoses: Sequence[Diagnosis], growths: Sequence[Array | None]) -> nested_fits.Worth:
     """Return what tells if a model of so many parameters could have a BIC that is clearly lowest.
 
     No linear sample fits better than the best of any, see `fit_any_sample`, at the start that was
-    fitted. That is not asked where the config names the models, nor believed where a model fits
-    better.
+    fitted. That is not asked where the config names the models or misfits are weighted, nor
+    believed where a model fits better.
     """
     least = [
         fit_any_sample(diagnosis.likelihood.problem.residuals).misfit
-        if diagnosis.identified[1].usual_models
+        if diagnosis.identified[1].usual_models and growth is None
         else np.inf
-        for diagnosis in diagnoses
+        for diagnosis, growth in zip(diagnoses, growths, strict=True)
     ]
 
     def worth(name: str, trace: int, fits: nested_fits.Fits) -> bool:
@@ -280,20 +299,28 @@ def _leaves_noise(problem: TraceProblem, answer: Fit, diagnosis: Diagnosis) -> b
     return doubts.compute_status(find_notes()) != REJECTED
 
 
-def _grows(diagnosis: Diagnosis) -> bool:
-    """Return True if noise clearly grows with the response; of a rejected fit that is misfit."""
-    likelihood = diagnosis.likelihood
-    growth = growth_left(likelihood.problem.residuals, likelihood.best)
-    return diagnosis.status != REJECTED and compare_extremes(growth) > levels.CLEARLY
+def _growth(diagnosis: Diagnosis) -> Array | None:
+    """Return the growth of the noise with the response, of each reading, if it clearly grows.
+
+    Noise that grows by a rejected fit is its misfit.
+    """
+    growth = growth_left(diagnosis.likelihood.problem.residuals, diagnosis.likelihood.best)
+    grows = diagnosis.status != REJECTED and compare_extremes(growth) > levels.CLEARLY
+    return growth if grows else None
+
+
+def _misfit(growth: Array | None, problem: TraceProblem, answer: Fit) -> float:
+    """Return the misfit of a model; in noise that grows, of a weighted fit, to first order."""
+    if growth is None:
+        return answer.misfit
+    left, slopes = problem.residuals(nested_fits.within_range(answer.parameters, problem))
+    return rms(without(absorbed(slopes / growth), left / growth))
 
 
 def _candidates(diagnosis: Diagnosis) -> tuple[str, ...]:
-    """Return the names of the models to fit to a trace, none if nothing is compared.
-
-    Misfits of noise that grows tell nothing before it is weighted, which a note on it advises.
-    """
+    """Return the names of the models to fit to a trace, none if nothing is compared."""
     experiment, residuals = diagnosis.identified[1], diagnosis.likelihood.problem.residuals
-    if experiment.fixed or _grows(diagnosis):
+    if experiment.fixed:
         return ()
     chosen, usual = experiment.sample.candidate, experiment.instrument.has_jaws
     # One network has one name: that asked for, or else that which is usual for the instrument.
