@@ -9,7 +9,7 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.identify.plausibility import _responds, check_recording
+from biogrip.identify.prepare import _responds, check_recording
 from biogrip.library import Sample, set_up, simulate
 from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.models import MODELS
@@ -53,9 +53,10 @@ def said(
     units = time.removeprefix("time_"), reading.removeprefix("rotation_")
     lines, file = np.arange(len(time_s)) + 2, Path("trace.csv")
     recording = Recording(time_s, values, lines, file, columns, units)
-    problem = replace(set_up(gripper, phases, Sample("maxwell")), offset=offset)
+    problem = set_up(gripper, phases, Sample("maxwell"))
+    problem = replace(problem, offset=offset, noise_sd=noise_sd)
     try:
-        return check_recording(recording, problem, noise_sd) or ""
+        return check_recording(recording, problem) or ""
     except BiogripError as error:
         return str(error)
 

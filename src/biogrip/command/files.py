@@ -40,8 +40,7 @@ from biogrip.fit.experiment import Experiment
 from biogrip.fit.problem import SearchRange
 from biogrip.identify.data import trace_data
 from biogrip.identify.identify import STEPS, budget, identify_alike
-from biogrip.identify.other_fits import Trace
-from biogrip.identify.prepare import prepare
+from biogrip.identify.prepare import Trace, prepare
 from biogrip.identify.together import Together, identify_sample_of
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.keys import plain

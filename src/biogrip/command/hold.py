@@ -8,7 +8,7 @@ import numpy as np
 from biogrip.config.case import SampleCase
 from biogrip.config.source import HOLD, RAMP
 from biogrip.digits import plain
-from biogrip.identify.other_fits import Trace
+from biogrip.identify.prepare import Trace
 from biogrip.traces.columns import held_unit, shape_and_sizes
 from biogrip.traces.reader import Recording
 

@@ -16,8 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from biogrip.arrays import Array, BoolArray, IntArray
-from biogrip.fit.least_squares import LocalFits
-from biogrip.fit.levenberg_marquardt import Minima, Normal
+from biogrip.fit.least_squares import LocalFits, Minima, Normal
 from biogrip.judging.likelihood import Likelihood, Quantity
 
 # E-folds from a bound at which a member counts as free, and by which rounding may exceed it.

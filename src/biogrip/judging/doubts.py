@@ -23,7 +23,8 @@ import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray
 from biogrip.digits import counted, p_value, plain
 from biogrip.fit.any_sample import fit_any_sample
-from biogrip.fit.noise_model_fit import (
+from biogrip.fit.trace_noise import (
+    NoiseModel,
     NoiseModelLikelihood,
     absorbed,
     compare_extremes,
@@ -32,7 +33,7 @@ from biogrip.fit.noise_model_fit import (
 )
 from biogrip.judging import whiteness
 from biogrip.judging.likelihood import Likelihood
-from biogrip.physics.noise import MOST_SAMPLES, ROOT_12, NoiseModel, estimate_noise, without
+from biogrip.physics.noise import MOST_SAMPLES, ROOT_12, estimate_noise, without
 from biogrip.physics.residuals import Residuals
 
 HARMLESS, DOUBT, REJECTION = "harmless", "doubt", "rejection"

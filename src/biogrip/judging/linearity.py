@@ -13,7 +13,7 @@ from scipy.special import fdtrc, stdtrit
 import biogrip.levels as levels
 from biogrip.arrays import Array
 from biogrip.digits import p_value, plain, with_limits
-from biogrip.fit.noise_model_fit import absorbed
+from biogrip.fit.trace_noise import absorbed
 from biogrip.judging.doubts import DOUBT, MANY, REJECTED, REJECTION, Note, compute_status
 from biogrip.judging.likelihood import Likelihood
 from biogrip.physics.noise import without
