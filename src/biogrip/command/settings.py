@@ -44,7 +44,7 @@ from biogrip.physics.instruments import (
 )
 from biogrip.physics.models import ALIASES, CANDIDATES
 from biogrip.physics.shapes import KNOWN_SHAPES
-from biogrip.traces.columns import held_unit, place
+from biogrip.traces.columns import held_unit, place, trace_file_problem
 from biogrip.traces.measurement_block import ARRAYS, READINGS, ByOptions, MeasurementBlock
 from biogrip.traces.reader import Recording, read_recording, recording_of_arrays
 
@@ -181,6 +181,8 @@ def read_trace(asked: Asked) -> tuple[Recording, SampleCase]:
 
     A `BiogripError` has file, line and column, or setting, that cannot be used.
     """
+    if not asked.arrays and (problem := trace_file_problem(asked.trace)):
+        raise BiogripError(f"{asked.place}: {problem}")
     case, recording = case_of(asked)
     columns = ByOptions(**vars(case.block.measurement))
     # What its protocol follows from was read before the protocol's start was known.
@@ -382,6 +384,7 @@ def check_settings(traces: Sequence[Asked]) -> None:
     problems.
     """
     every = [trace for own in traces for trace in own.traces]
+    every = [trace for trace in every if not trace_file_problem(trace.trace)]
     for config in dict.fromkeys(file for asked in every for file in asked.configs):
         for note in read_config_of(TraceConfig, [config])[1]:
             print(note, file=sys.stderr)
