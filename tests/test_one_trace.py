@@ -235,8 +235,8 @@ def test_text_that_is_no_value_of_an_option_is_refused() -> None:
     for option, text, said in (
         *(("--fix", text, "allowed is NAME=VALUE") for text in ("k", "k=much", "=1")),
         *(("--set", text, "allowed is KEY=VALUE") for text in ("k", "=1")),
-        ("--start", "soon", "found 'soon', allowed is a number of seconds, or fit"),
-        ("--hold", "0", "allowed is a number, and not 0"),
+        ("--start", "soon", "found 'soon', allowed is SECONDS: the protocol's start on the clock"),
+        ("--hold", "0", "found '0', allowed is VALUE: what was held"),
         *(("--hold", text, "allowed is a number, or one with") for text in ("nan", "much")),
         ("--hold", "-5,0%", "a decimal comma? Allowed is a point"),
         ("--set", "a.b=[1", "a.b: not valid YAML: "),

@@ -98,6 +98,8 @@ def identify_files(
     if plot is not None and not (alone and plot.suffix == ".png"):
         text = f"found {visible(plot)}; allowed is a name that ends with .png, of one trace."
         raise BiogripError(f"--plot: {text} For several there is --report.")
+    for trace in asked[0].traces if alone else ():
+        trace.refuse_missing()
     # Errors of options and config concern all traces: they are raised once, here.
     check_settings(asked)
     outputs = [output or sample.output for sample in asked] if rows is None else []

@@ -133,6 +133,11 @@ class Asked:
         renamed = {counts_as.get(key, key): value for key, value in measured.items()}
         return {**blocks, "measurement": renamed} if counts_as else blocks
 
+    def refuse_missing(self) -> None:
+        """Raise a `BiogripError` if there is no such file."""
+        if not self.arrays and (problem := trace_file_problem(self.trace)):
+            raise BiogripError(f"{self.place}: {problem}")
+
     def read(self, columns: MeasurementBlock) -> Recording:
         """Read the trace; a `BiogripError` has file, line and column, or array and index."""
         if self.arrays:
@@ -181,8 +186,7 @@ def read_trace(asked: Asked) -> tuple[Recording, SampleCase]:
 
     A `BiogripError` has file, line and column, or setting, that cannot be used.
     """
-    if not asked.arrays and (problem := trace_file_problem(asked.trace)):
-        raise BiogripError(f"{asked.place}: {problem}")
+    asked.refuse_missing()
     case, recording = case_of(asked)
     columns = ByOptions(**vars(case.block.measurement))
     # What its protocol follows from was read before the protocol's start was known.
