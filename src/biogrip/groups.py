@@ -18,7 +18,7 @@ from biogrip.command.outputs import FAILED, LINEAR, METHODS, WRITTEN_BY, check_o
 from biogrip.command.words import in_sentences, outcome_in_words, paragraph, together
 from biogrip.digits import counted, plain, rounded_numbers, with_limits, with_unit
 from biogrip.errors import BiogripError, nearest
-from biogrip.files import atomic_write
+from biogrip.files import atomic_write, read_rows, write_rows
 from biogrip.judging.cells import COLUMNS, Cell, Compared, Told, compare, gather, shared_columns
 from biogrip.judging.doubts import DOUBTFUL, OK, REJECTED
 from biogrip.judging.verdicts import (
@@ -28,7 +28,6 @@ from biogrip.judging.verdicts import (
     FIT_REJECTED,
     NOT_DETERMINED,
 )
-from biogrip.records import read_rows, write_rows
 from biogrip.terminal import aligned, visible, visible_lines
 from biogrip.traces.columns import trace_file_problem
 

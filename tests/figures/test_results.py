@@ -10,9 +10,9 @@ from biogrip.figures import style
 from biogrip.figures.fit import FittedTrace, draw_fit, scale_of
 from biogrip.figures.likelihood import draw_profile, draw_profiles_of
 from biogrip.figures.style import figure, save, styled
+from biogrip.files import write_object
 from biogrip.physics.instruments import MODULUS
 from biogrip.physics.models import MODELS
-from biogrip.records import write_object
 from biogrip_study.figures.case_fit import draw_fits
 from biogrip_study.figures.course import draw_convergence, draw_scatter
 from biogrip_study.methods.registry import METHODS

@@ -5,8 +5,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from biogrip.files import write_rows
 from biogrip.judging.likelihood import headlines
-from biogrip.records import write_rows
 from biogrip_study.records.identifications import identification_columns
 from biogrip_study.tables import sweeps as stage
 from biogrip_study.tables.sweeps import robustness

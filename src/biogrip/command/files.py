@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from biogrip import __version__
-from biogrip.command.hold import load_in_words
 from biogrip.command.options import Setting
 from biogrip.command.outputs import (
     WRITTEN_BY,
@@ -30,11 +29,11 @@ from biogrip.command.outputs import (
 )
 from biogrip.command.settings import Asked, check_settings, read_trace
 from biogrip.command.sheet import by_sample, is_table, read_table
-from biogrip.command.words import in_columns, in_words
+from biogrip.command.words import in_columns, in_words, load_in_words
 from biogrip.config.case import SampleCase
 from biogrip.config.loading import trace_defaults
 from biogrip.errors import BiogripError
-from biogrip.files import atomic_write, digest_of, software
+from biogrip.files import atomic_write, digest_of, software, write_rows
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.problem import SearchRange
 from biogrip.identify.data import trace_data
@@ -44,9 +43,7 @@ from biogrip.identify.prepare import prepare
 from biogrip.identify.together import Together, identify_sample_of
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.keys import plain
-from biogrip.processes import end_with
-from biogrip.records import write_rows
-from biogrip.terminal import Progress, visible
+from biogrip.terminal import Progress, end_with, visible
 from biogrip.traces.columns import trace_file_problem
 from biogrip.traces.reader import form_in_words, is_usual
 

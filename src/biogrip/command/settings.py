@@ -23,8 +23,8 @@ from urllib.parse import quote
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.command.hold import remarks_on_hold
 from biogrip.command.options import Setting
+from biogrip.command.words import remarks_on_hold
 from biogrip.config.case import SampleCase
 from biogrip.config.experiment_blocks import LARGEST_PARAMETER, LONGEST_S, SHORTEST_S
 from biogrip.config.loading import load, read_config_of, read_configs, trace_defaults

@@ -6,9 +6,14 @@ from math import log
 from textwrap import indent
 from typing import Any
 
+import numpy as np
+
 import biogrip.levels as levels
 from biogrip import __version__
+from biogrip.config.case import SampleCase
+from biogrip.config.source import HOLD, RAMP
 from biogrip.digits import counted, instant, legible, plain, with_limits, with_unit
+from biogrip.identify.other_fits import Trace
 from biogrip.judging.doubts import DOUBT, DOUBTFUL, HARMLESS, OK, REJECTED, REJECTION
 from biogrip.judging.verdicts import FIT_REJECTED, NOT_DETERMINED
 from biogrip.judging.what_moves import LEAST_MOVE, error_in_words
@@ -16,8 +21,9 @@ from biogrip.judging.without_model import BEYOND, EXPONENT, FLOW, LEVEL, LOSS
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.models import CANDIDATES
 from biogrip.terminal import aligned, visible, visible_lines
-from biogrip.traces.columns import shape_and_sizes
+from biogrip.traces.columns import held_unit, shape_and_sizes
 from biogrip.traces.measurement_block import KNOWN_NOISE
+from biogrip.traces.reader import Recording
 
 # Instrument whose readings span decades: their misfit is told over their noise.
 _SWEEPS = "oscillation"
@@ -26,6 +32,8 @@ _LINES = 5
 # Most names of traces that are refused for what another one is.
 _MOST_NAMED = 5
 _LIKELIHOOD_RATIO = "That they are of one sample was tested by two likelihood ratios (Bonferroni)."
+# Share of the largest load so far below which a contact shrinks, not only scatters.
+_STAYS = 0.9
 _NUMBER = re.compile(r"\d[\d.e+-]*")
 MEANS = {
     OK: "the residuals look like noise",
@@ -199,7 +207,9 @@ def given_in_words(found: Mapping[str, Any]) -> list[str]:
     """Return lines on what was held or loaded, a shape, and fixed parameters, as far as given."""
     lines = [visible(found["load"])] if "load" in found else []
     if shape := found["assumed"]["measurement"].get("shape"):
-        lines.append(f"Moduli, and G, K and J, are Young's, by the shape: {visible(shape)}.")
+        source = shape_and_sizes(shape)[0].source
+        text = f"Moduli, and G, K and J, are Young's, by the shape: {visible(shape)} ({source})."
+        lines.append(text)
     return [*lines, f"Fixed: {', '.join(found['fixed'])}."] if "fixed" in found else lines
 
 
@@ -317,6 +327,75 @@ def limits_in_short(quantity: Mapping[str, Any]) -> str:
     if low is not None:
         return f"≥ {plain(low, 2)}"
     return "?" if high is None else f"≤ {plain(high, 2)}"
+
+
+def load_in_words(trace: Trace, case: SampleCase, given: Mapping[str, Any]) -> str:
+    """Return what was held or loaded; nothing where a config has the protocol.
+
+    Given are the blocks of the config that the user has set.
+    """
+    (recording, experiment), measured = trace, case.block.measurement
+    controlled, start_s = measured.instrument.controlled, measured.start_s or 0.0
+    if recording.load is not None and experiment.record is not None:
+        column, loads = recording.form["columns"]["load"], experiment.record[:, 1]
+        if case.instrument.relative:
+            loads = loads * getattr(case.block.protocol.phases[0], controlled.column)
+        ends = loads.min(), loads.max()
+        low, high = (plain(controlled.in_unit(end, column["unit"])) for end in ends)
+        what = high if low == high else f"{low} to {high}"
+        what += f" {column['unit']}" * (column["unit"] != "1")
+        count = np.count_nonzero(recording.load[:, 0] >= start_s)
+        rows = f"column {column['column']}, {count:,} rows"
+        return f"Load: {what} from {start_s:g} s ({rows})."
+    if HOLD[0] not in given:
+        return ""
+    number, unit = held_unit(given[HOLD[0]], controlled)
+    start = "its start, as fitted," if experiment.fit_start else f"{start_s:g} s"
+    held = f"{number:g} {unit}".removesuffix(" 1")
+    what = f"{held} from {start} to {recording.form['last_s']:g} s"
+    rise = f", reached within {given[RAMP[0]]:g} s" if RAMP[0] in given else ""
+    return f"Held: {what}{rise}."
+
+
+def _shrinks(recording: Recording, case: SampleCase) -> tuple[str, ...]:
+    """Return a sentence if a tip was drawn back, where its contact has no such sum."""
+    instrument = case.block.measurement.instrument
+    if recording.load is None or instrument.read.power == instrument.controlled.power == 1:
+        return ()
+    time_s, loads = recording.load[recording.load[:, 0] <= recording.form["last_s"]].T
+    most = np.maximum.accumulate(loads)
+    falls = np.flatnonzero((most > 0.1 * most[-1]) & (loads < _STAYS * most))
+    if not len(falls):
+        return ()
+    return (
+        f"The contact shrinks from {time_s[falls[0]]:g} s on: what is said holds while it grows or "
+        f"stays. Leave these readings out: --until {time_s[falls[0] - 1]:g}.",
+    )
+
+
+def remarks_on_hold(
+    recording: Recording, case: SampleCase, given: Mapping[str, Any]
+) -> tuple[str, ...]:
+    """Return a sentence if a tip was drawn back, or what was held may be in another unit.
+
+    That is if readings have a unit with a prefix, and what was held is a number.
+    """
+    if shrinks := _shrinks(recording, case):
+        return shrinks
+    read, controlled = case.instrument.read, case.instrument.controlled
+    unit, held = recording.units[1], given.get(HOLD[0])
+    prefix = unit.removesuffix(read.unit)
+    if held is None or not (prefix and read.unit and controlled.unit) or prefix == unit:
+        return ()
+    number, taken = held_unit(held, controlled)
+    if taken != controlled.unit or str(held).rstrip().endswith(taken):
+        return ()
+    likely = prefix + controlled.unit
+    likely = likely if likely in controlled.units else controlled.unit
+    return (
+        f"The {read.name} is in {unit}, but what was held, {number:g}, is taken to be in {taken}: "
+        f'say its unit, as in --hold "{number:g} {likely}".',
+    )
 
 
 REFERENCE = (

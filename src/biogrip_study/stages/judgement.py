@@ -21,6 +21,7 @@ import numpy as np
 
 from biogrip.arrays import Array, IntArray
 from biogrip.digits import rounded_numbers
+from biogrip.files import write_object
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import fit_from, identify_from
 from biogrip.fit.trace_fit import TraceFit, fit_least_squares
@@ -32,7 +33,6 @@ from biogrip.judging.quantities import Quantity, parameters_and_sum
 from biogrip.judging.verdicts import DETERMINED, Finding, compute_findings
 from biogrip.physics.noise import add_noise, rms, standard_deviation
 from biogrip.physics.sample_model import SampleModel, with_fixed
-from biogrip.records import write_object
 from biogrip.terminal import Progress
 from biogrip_study.config.study import Case
 from biogrip_study.records.identifications import INTERVALS, read_verdicts
