@@ -4,8 +4,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from biogrip.files import write_rows
 from biogrip.judging.likelihood import bounds_percent
-from biogrip.records import write_rows
 from biogrip_study.records.identifications import identification_columns
 from biogrip_study.stages.targets import noise_of_readings
 from biogrip_study.tables import sweeps as stage

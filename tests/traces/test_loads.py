@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.command.hold import load_in_words
 from biogrip.command.options import Setting
 from biogrip.command.settings import Asked, case_of, read_trace
+from biogrip.command.words import load_in_words
 from biogrip.config.source import HOLD
 from biogrip.errors import BiogripError
 from biogrip.identify.data import trace_data

@@ -20,6 +20,7 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.digits import rounded_numbers
+from biogrip.files import write_object
 from biogrip.fit.least_squares import identify_from
 from biogrip.fit.trace_fit import TraceFit, fit_least_squares
 from biogrip.identify.data import judged_data
@@ -28,7 +29,6 @@ from biogrip.judging.diagnosis import Diagnosis, diagnose, profiled, settled
 from biogrip.judging.likelihood import Likelihood, Quantity, parameters_and_sum
 from biogrip.judging.profiles import DETERMINED, Finding, compute_findings
 from biogrip.physics.noise import add_noise, rms, standard_deviation
-from biogrip.records import write_object
 from biogrip.terminal import Progress
 from biogrip_study.config.study import Case
 from biogrip_study.records.identifications import INTERVALS, read_verdicts
