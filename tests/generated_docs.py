@@ -33,9 +33,8 @@ from biogrip.fit.least_squares import identify_many
 from biogrip.fit.problem import silent
 from biogrip.physics.drawing import sketched
 from biogrip.physics.models import ALIASES, MODELS
-from biogrip.physics.modes import linear_responses
 from biogrip.physics.noise import add_noise, standard_deviation, stream
-from biogrip.physics.simulation import simulated_response
+from biogrip.physics.response import linear_responses, simulated_response
 from biogrip.records import read_table
 from biogrip_study.config.study import Case
 from biogrip_study.page import answers

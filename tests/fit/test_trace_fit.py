@@ -15,7 +15,7 @@ from biogrip.fit.trace_fit import TraceFit, _has_settled, gripper_functions
 from biogrip.levels import OUTLYING
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.noise import AR1, Drift, Noise, NoiseModel, Outliers, add_noise
-from biogrip.physics.simulation import simulated_response
+from biogrip.physics.response import simulated_response
 from tests.helpers.default import STUDY
 
 CASE = STUDY.cases["liquid_drop_2"]

@@ -20,8 +20,8 @@ from biogrip.judging.likelihood import (
 from biogrip.judging.quantities import characteristic_times, find_combinations, parameters_and_sum
 from biogrip.judging.verdicts import BOUNDED_ABOVE, DETERMINED, NOT_DETERMINED
 from biogrip.physics.models import CANDIDATES, MODELS, Sample
+from biogrip.physics.response import Grip
 from biogrip.physics.sample_model import Network
-from biogrip.physics.simulation import Grip
 from tests.helpers.default import seen
 from tests.helpers.problems import (
     MODEL,

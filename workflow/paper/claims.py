@@ -27,7 +27,7 @@ from biogrip.levels import DETERMINED_PERCENT
 from biogrip.physics.gripper import ARM_KEYS, Gripper
 from biogrip.physics.noise import Noise, add_noise, rms, standard_deviation, stream
 from biogrip.physics.protocol import sample_times
-from biogrip.physics.simulation import simulated_response
+from biogrip.physics.response import simulated_response
 from biogrip_study.config.study import Case, Study
 from biogrip_study.gripper.calibration import calibrate, free_motion
 from biogrip_study.records.identifications import (

@@ -16,7 +16,7 @@ from biogrip.figures.style import BLACK, BLUE, ORANGE, PAGE_IN, SHADE, figure, p
 from biogrip.judging.likelihood import bounds_percent
 from biogrip.levels import DETERMINED_PERCENT
 from biogrip.physics.noise import standard_deviation
-from biogrip.physics.simulation import compute_grip, simulated_response
+from biogrip.physics.response import compute_grip, simulated_response
 from biogrip_study.config.study import Case, Study
 from biogrip_study.gripper.nonlinear import jaw_force
 from biogrip_study.records.identifications import read_batch, share_with_limits

@@ -22,9 +22,10 @@ import numpy as np
 from biogrip.arrays import Array, BoolArray
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.noise_model_fit import absorbed
-from biogrip.physics.modes import Modes, lag_course
+from biogrip.physics.modes import lag_course
 from biogrip.physics.protocol import SWEEP, Course
 from biogrip.physics.residuals import Residuals
+from biogrip.physics.response import Modes
 
 # Lags: shortest over the time between the closest readings, longest over the protocol; how many a
 # decade smooth a trace, and that of what does not relax.

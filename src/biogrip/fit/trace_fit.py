@@ -26,7 +26,7 @@ from biogrip.fit.noise_model_fit import (
 from biogrip.fit.problem import Fit, ReportProgress, TraceProblem, silent
 from biogrip.physics.noise import NoiseModel, drift_is_flow
 from biogrip.physics.protocol import Phase, join_phases
-from biogrip.physics.simulation import simulated_response
+from biogrip.physics.response import simulated_response
 
 # Square of three standard uncertainties.
 _SECOND_ORDER = 9.0

@@ -28,8 +28,8 @@ from biogrip.arrays import Array
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.problem import TraceProblem
 from biogrip.judging.quantities import Quantity, parameters_and_sum
-from biogrip.physics.modes import linear_responses
 from biogrip.physics.noise import Noise, standard_deviation
+from biogrip.physics.response import linear_responses
 
 # Error of sums of squares, as a share of those of the largest reading or response.
 _ERROR_OF_SUMS = 1e-12
