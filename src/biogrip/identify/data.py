@@ -12,7 +12,7 @@ from biogrip.judging.doubts import REJECTED, REJECTION, find_reasons, order_note
 from biogrip.judging.linearity import NOT_LINEAR
 from biogrip.judging.profiles import FIT_REJECTED, Finding
 from biogrip.physics.noise import within
-from biogrip.physics.simulation import simulated_response
+from biogrip.physics.response import simulated_response
 from biogrip.traces.reader import Recording
 
 

@@ -28,10 +28,11 @@ import numpy as np
 from numpy.polynomial import chebyshev, legendre
 
 from biogrip.arrays import Array
-from biogrip.physics.modes import Modes, mode_responses, responses_in_turn, sum_of_modes
+from biogrip.physics.modes import mode_responses, responses_in_turn
 from biogrip.physics.noise import without
 from biogrip.physics.protocol import Course
 from biogrip.physics.rate_tables import ModeRows, SpanningModes
+from biogrip.physics.response import Modes, sum_of_modes
 
 _NODES_A_PIECE = 20
 # Square of a norm that may be rounding.
