@@ -218,6 +218,7 @@ KINDS = {
         " s on: what is said holds while it grows or stays. Leave these readings out: --until ",
     ),
     "typed by tests of onsets, contacts and damaged results": (
+        "time that it remembers of that: --from, ",
         *("--start says when", "). If it does, say --start fit", "say --contact fit"),
         *(" came. Say when the protocol started (--start", "It is damaged: the same command with"),
     ),

@@ -194,3 +194,32 @@ def test_a_load_that_is_on_or_off_has_its_steps(tmp_path: Path) -> None:
     found = identified(tmp_path, trace, *given, "--model", "kelvin_voigt", "--no-compare")
     assert found["fit"] == "ok"
     holds(found, k_p=2e-5, c_p=4e-5)
+
+
+SINE_S: Array = np.arange(1000) * 0.025
+
+
+def oscillating(path: Path, phase: float, *, rested: bool, tau_s: float = 3.0) -> Path:
+    """Strain sin(t + phase), and stress by the complex modulus; from rest a branch fades, too."""
+    turn, pole = np.exp(1j * (SINE_S + phase)), 1j * tau_s / (1 + 1j * tau_s)
+    fading = K * (np.sin(phase) - (pole * np.exp(1j * phase)).imag) * np.exp(-SINE_S / tau_s)
+    stress = ((K_P + K * pole) * turn).imag + rested * fading + noise(len(SINE_S), 1.0)
+    table, names = np.column_stack((SINE_S, turn.imag, stress)), "time_s,strain,stress_Pa"
+    np.savetxt(path, table, delimiter=",", header=names, comments="")
+    return path
+
+
+def test_a_sample_that_moved_before_the_first_row_is_doubted(tmp_path: Path) -> None:
+    """Steady from before the first row on, limits exclude the truth, as they hang on its rest."""
+    given = ("--reading", "stress", "--load", "strain", "--model", "zener_maxwell", "--no-compare")
+    rested = oscillating(tmp_path / "rested.csv", 0.0, rested=True)
+    found = identified(tmp_path, rested, *given)
+    assert found["fit"] == "ok", found["reasons"]
+    holds(found, k=K, k_p=K_P, tau=3.0)
+    moved = oscillating(tmp_path / "moved.csv", 1.0, rested=False)
+    found = identified(tmp_path, moved, *given)
+    assert found["fit"] == "doubtful"
+    assert "The strain moves from the first row on" in found["reasons"][0]
+    assert by_quantity(found)["k_p"]["low"] > K_P
+    told = by_quantity(identified(tmp_path, moved, *given, "--from", "12"))["k_p"]
+    assert (told["low"] or 0) < K_P < (told["high"] or np.inf)

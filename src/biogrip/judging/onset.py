@@ -34,10 +34,12 @@ from biogrip.judging.diagnosis import Diagnosis
 from biogrip.judging.doubts import DOUBT, HARMLESS, MANY, REJECTED, REJECTION, RING, Note
 from biogrip.judging.likelihood import Likelihood, compute_fall, make_likelihood
 from biogrip.judging.profiles import Finding, compute_findings
+from biogrip.judging.whiteness import is_still
 from biogrip.physics.modes import lag_course
 from biogrip.physics.noise import estimate_noise, nuisance_basis, without
 from biogrip.physics.protocol import evaluate, spacing_at
 from biogrip.physics.residuals import Residuals
+from biogrip.physics.response import compute_modes
 from biogrip.traces.reader import Recording
 
 _LAGS_A_DECADE = 2
@@ -270,10 +272,12 @@ def notes_on_start(
             notes += _about_late_onset(OnsetFits(free, time_s, readings), diagnosis, onset_s)
     if diagnosis.status != REJECTED and ramped and not notes:
         notes += _about_ramp(diagnosis, ramped, recorded=experiment.record is not None)
-    smooth = experiment.record is not None and not experiment.uncertainty.get("steps")
-    smooth &= experiment.load_errors is None
-    if smooth and not experiment.coloured and len(time_s) <= MANY:
+    followed = experiment.record is not None and not experiment.uncertainty.get("steps")
+    known = followed and experiment.load_errors is None
+    if known and not experiment.coloured and len(time_s) <= MANY:
         notes += _about_load(diagnosis)
+    if followed and not experiment.offset and _begins_amid(experiment.record, readings):
+        notes += _about_rest(diagnosis)
     return notes
 
 
@@ -335,6 +339,43 @@ def _about_load(diagnosis: Diagnosis) -> Iterator[Note]:
             f"fits far better (χ² falls by {plain(fall)}), and {values}. Correct its times if the "
             "logger or a filter delays it.",
         )
+
+
+def _begins_amid(record: Array | None, readings: Array) -> bool:
+    """Return True if a recorded load moves at its first rows, and a sample felt something then."""
+    assert record is not None
+    least = (
+        (each, levels.OF_PEAK_AT_REST * float(np.ptp(each))) for each in (record[:, 1], readings)
+    )
+    felt = any(abs(each[0]) > size + levels.OUTLYING * estimate_noise(each) for each, size in least)
+    return felt and not is_still(record[: levels.FEWEST_STILL, 1])
+
+
+def _about_rest(diagnosis: Diagnosis) -> Iterator[Note]:
+    """Yield a note if limits hang on the sample's rest before the first row.
+
+    What it remembers of before fades at the rates of its modes; to first order.
+    """
+    likelihood, residuals = diagnosis.likelihood, diagnosis.likelihood.problem.residuals
+    slopes, time_s = residuals(likelihood.best)[1], residuals.trace.time_s
+    parameters = np.exp(likelihood.best)[None]
+    modes = compute_modes(residuals.gripper, residuals.model, residuals.course, parameters)
+    faded = np.exp(modes.rates[0, :, None] * (time_s - time_s[0]))
+    # Of equal sizes; what cannot be told at all still has a number.
+    slopes = slopes / np.linalg.norm(slopes, axis=1)[:, None]
+    both = slopes, without(absorbed(np.vstack((faded, residuals.trace.condensed.taken))), slopes)
+    rounding = _TOLD * np.eye(len(slopes))
+    known, unknown = (np.diag(np.linalg.inv(rows @ rows.T + rounding)) for rows in both)
+    wider = np.sqrt(unknown / known)
+    if wider.max() > levels.WIDER_WITHOUT_REST:
+        name = residuals.model.names[int(np.argmax(wider))]
+        text = (
+            f"The {residuals.instrument.controlled.name} moves from the first row on, and the "
+            f"sample is taken to be at rest before: else the limits of {name} would be "
+            f"{plain(float(wider.max()), 2)} times as wide. If it was moved before, leave out the "
+            "time that it remembers of that: --from, measurement.from_s."
+        )
+        yield Note(DOUBT, text)
 
 
 def is_cut_off(time_s: Array) -> bool:
