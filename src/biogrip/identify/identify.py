@@ -29,8 +29,15 @@ from biogrip.identify.other_fits import (
 )
 from biogrip.identify.prepare import prepare
 from biogrip.judging.diagnosis import Diagnosis, diagnose_all, with_times
-from biogrip.judging.doubts import DOUBT, HARMLESS, ROUNDED, Note, find_slow_misfit, name_suspects
-from biogrip.judging.linearity import notes_on_gains
+from biogrip.judging.doubts import (
+    DOUBT,
+    HARMLESS,
+    ROUNDED,
+    Note,
+    find_slow_misfit,
+    name_suspects,
+    notes_on_gains,
+)
 from biogrip.judging.onset import notes_on_start, profile_over_onset
 from biogrip.traces.reader import Recording
 

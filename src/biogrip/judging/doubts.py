@@ -10,21 +10,24 @@ readings may be noise all the same, if it is correlated for a short time (`has_f
 is misfit. A misfit of 2 % of the peak or more rejects the fit. With a smaller one limits count
 independent residuals only: the fit is good to so much of the peak, which is doubtful, not wrong. A
 noise model that is correlated for too long may be misfit, too (`find_slow_misfit`).
+
+What is read is the sum of what each level that was held causes. Of a linear sample all have one
+gain, which its stiffnesses take; of one that stiffens or softens, each level has its own, which one
+test tells (`notes_on_gains`).
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
-from scipy.special import chdtr, chdtrc
+from scipy.special import chdtr, chdtrc, fdtrc, stdtrit
 
 import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray
-from biogrip.digits import counted, p_value, plain
+from biogrip.digits import counted, p_value, plain, with_limits
 from biogrip.fit.any_sample import fit_any_sample
 from biogrip.fit.noise_model_fit import (
-    NoiseModelLikelihood,
     absorbed,
     compare_extremes,
     compute_growth,
@@ -32,7 +35,8 @@ from biogrip.fit.noise_model_fit import (
 )
 from biogrip.judging import whiteness
 from biogrip.judging.likelihood import Likelihood
-from biogrip.physics.noise import MOST_SAMPLES, ROOT_12, NoiseModel, estimate_noise, without
+from biogrip.physics.noise import ROOT_12, NoiseModel, estimate_noise, without
+from biogrip.physics.protocol import Course, superposed
 from biogrip.physics.residuals import Residuals
 
 HARMLESS, DOUBT, REJECTION = "harmless", "doubt", "rejection"
@@ -41,7 +45,7 @@ HARMLESS, DOUBT, REJECTION = "harmless", "doubt", "rejection"
 OK, DOUBTFUL, REJECTED = "ok", "doubtful", "rejected"
 """Status of a fit by the heaviest of its notes."""
 
-ROUNDED, RING = "rounded", "ring"
+ROUNDED, RING, NOT_LINEAR = "rounded", "ring", "not linear"
 """What notes are about that others depend on."""
 
 _STATUS = {HARMLESS: OK, DOUBT: DOUBTFUL, REJECTION: REJECTED}
@@ -57,7 +61,7 @@ class Note:
     text: str
     """The sentence."""
     about: str = ""
-    """`ROUNDED`, `RING` or `biogrip.judging.linearity.NOT_LINEAR`, if it is about that."""
+    """`ROUNDED`, `RING` or `NOT_LINEAR`, if it is about that."""
 
 
 def compute_status(notes: Sequence[Note]) -> str:
@@ -177,7 +181,7 @@ def examine_residuals(likelihood: Likelihood) -> tuple[Likelihood, FindNotes]:
     certain = left.correlation[1] < levels.CERTAIN_MISFIT and left.times > levels.TOO_MUCH
     found, worth, find_notes = None, None, _find_notes
     if certain and not left.lines:
-        found, worth = _misfit(left, residual, slopes)
+        found, worth = _misfit(left, residual)
     small = misfit <= levels.TOO_MUCH * rounding / ROOT_12 and np.max(np.abs(residual)) <= rounding
     small &= not residuals.course.sweeps and not residuals.coloured
     if small and likelihood.freedom < np.inf:
@@ -229,7 +233,7 @@ def _find_notes_of_rounding(left: _Left, misfit: Note | None = None) -> list[Not
     return [Note(HARMLESS if status == OK else DOUBT, text, ROUNDED)]
 
 
-def _misfit(left: _Left, residual: Array, slopes: Array) -> tuple[Note, tuple[float, float] | None]:
+def _misfit(left: _Left, residual: Array) -> tuple[Note, tuple[float, float] | None]:
     """Return the note on a misfit, and its worth and freedom if limits allow for it."""
     residuals, times, scale = left.likelihood.problem.residuals, left.times, left.scale
     more = plain(times, 2)
@@ -237,7 +241,8 @@ def _misfit(left: _Left, residual: Array, slopes: Array) -> tuple[Note, tuple[fl
     relative = residuals.course.sweeps and residuals.coloured
     of_peak = f"{plain(100 * share, 2)} % of the {'moduli' if relative else 'peak'}"
     suspects = name_suspects(residuals, times, scale)
-    if not residuals.course.sweeps and has_fast_noise(residuals, residual, slopes):
+    misfit = whiteness.as_correlated(left.bulk, left.basis)
+    if not residuals.course.sweeps and has_fast_noise(residuals, residual, misfit[0]):
         text = (
             f"The RMS residual is {more} times the noise of neighbouring readings, as of noise "
             "that is correlated for a short time."
@@ -252,7 +257,6 @@ def _misfit(left: _Left, residual: Array, slopes: Array) -> tuple[Note, tuple[fl
             f"The RMS residual is {more} times the noise of the trace, and {of_peak}: {suspects}."
         )
         return Note(REJECTION, text), None
-    misfit = whiteness.as_correlated(left.bulk, left.basis)
     if misfit[0] < 1:
         slow = "broad as the sweep" if residuals.course.sweeps else "slow as the trace"
         text += f" It is as {slow}, which the limits allow for."
@@ -445,22 +449,108 @@ def find_slow_misfit(
     )
 
 
-def has_fast_noise(residuals: Residuals, residual: Array, slopes: Array) -> bool:
+def has_fast_noise(residuals: Residuals, residual: Array, independent: float) -> bool:
     """Return True if what a fit leaves is stationary noise that is correlated for a short time.
 
-    Slopes are (n_parameters, n_samples). Of more than `MOST_SAMPLES` readings, or white ones, it is
-    not.
+    It counts as so many independent residuals: see `whiteness.as_correlated`.
     """
-    time_s = residuals.trace.time_s
-    if residuals.coloured or len(time_s) > MOST_SAMPLES:
-        return False
     stretches = np.array_split(np.square(residual), min(_SLOW_STRETCHES, len(residual)))
     largest = max(float(np.sum(stretch)) for stretch in stretches)
-    if largest > levels.IN_ONE_STRETCH * float(residual @ residual):
-        return False
-    noise_model = NoiseModelLikelihood(time_s, residual, slopes).best()
-    fast = noise_model.time_s <= levels.SLOW * residuals.duration_s
+    stationary = largest <= levels.IN_ONE_STRETCH * float(residual @ residual)
     # Neighbours of such noise differ by a root of its readings less than all of it scatters.
     scatter = np.sqrt(np.mean(residual**2)) / max(residuals.noise_scale, 1e-300)
-    rough = scatter < levels.SMOOTH * np.sqrt(max(levels.SLOW * len(time_s), 1.0))
-    return fast and bool(rough) and noise_model.ar1 > levels.NOTICEABLE
+    rough = scatter < levels.SMOOTH * np.sqrt(max(levels.SLOW * len(residual), 1.0))
+    fast = independent > 0.5 / levels.SLOW
+    return stationary and bool(rough) and fast and not residuals.coloured
+
+
+# Most levels of which gains are told; steps with which gains settle.
+_MOST_LEVELS, _STEPS = 10, 8
+
+
+def held_levels(course: Course) -> list[tuple[float, Course]]:
+    """Return the levels at which a load is held, ascending in size, and the protocol of each alone.
+
+    Levels are one that differ by less than a tenth, and none below a tenth of the largest.
+    """
+    ends_s = np.append(course.time_s[1:], course.end_s)
+    heights = np.where(np.any(course.within_phases[:, 1:], axis=1), 0.0, course.within_phases[:, 0])
+    order = np.argsort(np.abs(heights), kind="stable")
+    order = order[np.abs(heights[order]) > levels.HELD * np.abs(heights).max(initial=0.0)]
+    groups: list[list[int]] = []
+    for phase in order.tolist():
+        close = levels.HELD * abs(heights[phase])
+        if groups and abs(heights[phase] - heights[groups[-1][0]]) < close:
+            groups[-1].append(phase)
+        else:
+            groups.append([phase])
+    found = []
+    for group in groups:
+        starts_s = np.concatenate((course.time_s[group], ends_s[group]))
+        changes = np.zeros((len(starts_s), 3))
+        changes[:, 0] = np.concatenate((heights[group], -heights[group]))
+        own = superposed(starts_s, changes, course.end_s, deforms=course.deforms)
+        found.append((float(np.mean(heights[group])), own))
+    return found
+
+
+def notes_on_gains(likelihood: Likelihood, notes: list[Note]) -> Iterator[Note]:
+    """Yield a note if gains of levels differ, by an F test; others say if the fit is rejected."""
+    residuals = likelihood.problem.residuals
+    if residuals.course.sweeps or residuals.samples > MANY:
+        return
+    held = held_levels(residuals.course)
+    if not 1 < len(held) <= _MOST_LEVELS:
+        return
+    found = _gains(likelihood, [replace(residuals, course=course) for _, course in held[1:]])
+    if found is None:
+        return
+    gains, errors, chance = found
+    instrument = residuals.instrument
+    unit = f" {instrument.controlled.unit}".rstrip()
+    said = " and ".join(
+        f"at {plain(level)}{unit} is {with_limits(gain, gain - error, gain + error)}"
+        for (level, _), gain, error in zip(held[1:], gains, errors, strict=True)
+    )
+    yield Note(
+        REJECTION if compute_status(notes) == REJECTED else DOUBT,
+        f"{instrument.read.title.capitalize()} per {instrument.controlled.name} {said} of that "
+        f"at {plain(held[0][0])}{unit} ({p_value(chance)}): the sample is not linear.",
+        NOT_LINEAR,
+    )
+
+
+def _gains(
+    likelihood: Likelihood, levels_alone: list[Residuals]
+) -> tuple[Array, Array, float] | None:
+    """Fit gains over that of the first level, and the sample along, by steps of Gauss-Newton.
+
+    Returns the gains, (n_levels - 1,), half widths of their limits, and the chance of as much if
+    the sample is linear; None if it may be.
+    """
+    residuals, best = likelihood.problem.residuals, likelihood.best.copy()
+    condensed, gains, chance = residuals.trace.condensed, np.ones(len(levels_alone)), 1.0
+    for step in range(_STEPS):
+        left, slopes = residuals(best)
+        shown = condensed.cleared(np.array([level.simulated(best) for level in levels_alone]))
+        left = left + (gains - 1) @ shown[:, 0]
+        slopes = slopes + np.tensordot(gains - 1, shown[:, 1:], 1)
+        basis = absorbed(np.vstack((slopes, condensed.taken)))
+        alone, rest = without(basis, shown[:, 0]), without(basis, left)
+        free = len(rest) - len(basis) - len(alone)
+        if free < 1:
+            return None
+        more = np.asarray(np.linalg.lstsq(alone.T, -rest)[0], np.float64)
+        after = rest + more @ alone
+        square = float(after @ after) / free
+        if not step:
+            explained = float(rest @ rest - after @ after)
+            chance = float(fdtrc(len(alone), free, explained / len(alone) / square))
+            if chance >= levels.FALSE_ALARM:
+                return None
+        more = np.clip(more, -0.5, 0.5)
+        gains += more
+        best += np.clip(np.linalg.lstsq(slopes.T, -left - more @ shown[:, 0])[0], -1.0, 1.0)
+    room = stdtrit(free, 0.5 + likelihood.confidence / 2)
+    errors = room * np.sqrt(square * np.diagonal(np.linalg.pinv(alone @ alone.T)))
+    return gains, errors, chance

@@ -254,6 +254,7 @@ def notes_on_start(
     """
     time_s, readings = recording.time_s, recording.readings
     given, notes = experiment.start_given, list[Note]()
+    rejected = diagnosis.status == REJECTED
     ramped = _with_ramp(diagnosis.likelihood.problem.residuals)
     if not given and ramped and recording.read.from_s is None and is_cut_off(time_s):
         text = (
@@ -261,14 +262,14 @@ def notes_on_start(
             "clock of something longer: values hang on when it came. Say when the protocol started "
             "(--start, measurement.start_s), be it at 0, or what came before (--config, protocol)."
         )
-        notes.append(Note(DOUBT, text))
+        notes.append(Note(REJECTION if rejected else DOUBT, text))
     elif not given and begins_constant(time_s, readings):
         # A constant that is not zero is an offset, with which the onset would be biased.
         free = replace(experiment, offset=True)
         onset_s = estimate_onset(experiment, time_s, readings)
         if begins_constant(time_s, readings, onset_s):
             notes += _about_late_onset(OnsetFits(free, time_s, readings), diagnosis, onset_s)
-    if diagnosis.status != REJECTED and ramped and not notes:
+    if ramped and not rejected and not notes:
         notes += _about_ramp(diagnosis, ramped, recorded=experiment.record is not None)
     smooth = experiment.record is not None and not experiment.uncertainty.get("steps")
     smooth &= experiment.load_errors is None
