@@ -75,10 +75,6 @@ FEWEST_INDEPENDENT, LEAST_FREEDOM = 0.3, 3.0
 """A misfit that is smooth over half a trace would seem worth next to nothing: so few hardly lower
 the share of limits that hold (`tests/judging/test_whiteness.py`)."""
 
-PERIODS, EVEN = 10, 0.01
-"""Fewest periods of a line, as what is slower may be misfit, and the largest difference of
-intervals, as a share, with which it has a spectrum. Chosen."""
-
 # The start of a protocol.
 
 SURELY = 1e-9

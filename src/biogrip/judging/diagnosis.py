@@ -303,15 +303,9 @@ def _ringing(judged: Diagnosis, *, rejected: bool) -> Iterator[Note]:
             REJECTION if rejected else DOUBT,
             "The arms ring: their inertia, which fits leave out, changes readings of this sample "
             f"by up to {plain(ring.largest, 2)} times the noise. Leave out the readings of the "
-            f"first {_rounded_up(1e3 * ring.lasts_s)} ms after each change of the torque.",
+            f"first {np.ceil(1e3 * ring.lasts_s):.0f} ms after each change of the torque.",
             RING,
         )
-
-
-def _rounded_up(value: float) -> str:
-    """Return a number of two digits that is not below the value."""
-    unit = 10.0 ** (np.floor(np.log10(value)) - 1) if value > 0 else 1.0
-    return f"{unit * np.ceil(value / unit * (1 - 1e-9)):.6g}"
 
 
 def _pulling(grip: Grip | None, last_s: float) -> Iterator[Note]:

@@ -2,7 +2,7 @@
 
 The heaviest note decides the status of a fit: ok, doubtful or rejected (`compute_status`).
 Residuals are tested for white noise (`biogrip.judging.whiteness`), each test at the level
-`FALSE_ALARM`. A line or a step that explains the others is named in their place. Noise that grows
+`FALSE_ALARM`. A step that explains the others is named in their place. Noise that grows
 with the rotation is told first, and the other tests are of what it leaves.
 
 What is correlated beyond chance (`CERTAIN_MISFIT`) and larger than the scatter of neighbouring
@@ -83,8 +83,8 @@ def find_reasons(notes: Sequence[Note]) -> list[str]:
 
 # Of more readings no basis is formed: what a fit absorbs of so many is nothing.
 MANY = 100_000
-# Most outliers that are named, and lines of a spectrum.
-_NAMED, _MOST_LINES = 5, 3
+# Most outliers that are named.
+_NAMED = 5
 
 
 FindNotes = Callable[[], list[Note]]
@@ -116,34 +116,6 @@ class _Left:
     def correlation(self) -> tuple[float, float]:
         """Correlation of neighbours, and its chance."""
         return whiteness.correlated(self.bulk, self.basis)
-
-    @cached_property
-    def lines(self) -> list[str]:
-        """Sentence on lines in the spectrum, if there is no other misfit.
-
-        Outliers have all frequencies, and sweeps none. What a smoothed load leaves has its own.
-        """
-        residuals = self.likelihood.problem.residuals
-        if residuals.course.sweeps or residuals.course.smoothed or self.struck.any():
-            return []
-        rest, taken, named = self.bulk, self.basis, list[str]()
-        unit, slowest = f" {residuals.instrument.read.unit}".rstrip(), np.inf
-        while len(named) < _MOST_LINES:
-            frequency, chance, line = whiteness.find_line(rest, residuals.trace.time_s)
-            if chance >= levels.FALSE_ALARM:
-                break
-            amplitude = float(np.linalg.norm(line @ rest)) * np.sqrt(2 / len(rest))
-            named.append(f"{plain(frequency, 3)} Hz ({plain(amplitude, 2)}{unit})")
-            slowest = min(slowest, frequency)
-            taken = absorbed(np.vstack((taken, line)))
-            rest = without(taken, self.bulk)
-        large = float(np.sqrt(np.mean(rest**2))) > levels.TOO_MUCH * self.scale
-        if not named or (large and whiteness.correlated(rest, taken)[1] < levels.CERTAIN_MISFIT):
-            return []
-        return [
-            f"The residual has a line in its spectrum, at {' and '.join(named)}, as of hum or a "
-            f"vibration. Filter it out, or average the readings over {plain(1 / slowest, 3)} s."
-        ]
 
 
 def examine_residuals(likelihood: Likelihood) -> tuple[Likelihood, FindNotes]:
@@ -180,7 +152,7 @@ def examine_residuals(likelihood: Likelihood) -> tuple[Likelihood, FindNotes]:
     left = _Left(likelihood, growth, struck, standard[~struck], basis, scale)
     certain = left.correlation[1] < levels.CERTAIN_MISFIT and left.times > levels.TOO_MUCH
     found, worth, find_notes = None, None, _find_notes
-    if certain and not left.lines:
+    if certain:
         found, worth = _misfit(left, residual)
     small = misfit <= levels.TOO_MUCH * rounding / ROOT_12 and np.max(np.abs(residual)) <= rounding
     small &= not residuals.course.sweeps and not residuals.coloured
@@ -213,7 +185,7 @@ def _find_notes(left: _Left, misfit: Note | None = None) -> list[Note]:
         colour = list(_about_colour(left))
         changes = _about_changes(left, coloured=bool(colour))
         # The misfit is said once.
-        doubts += left.lines or changes[-1:] if misfit else left.lines or changes or colour
+        doubts += changes[-1:] if misfit else changes or colour
     notes += (Note(DOUBT, doubt) for doubt in doubts)
     if notes and in_time and not residuals.coloured and compute_status(notes) == DOUBTFUL:
         how = "If the set-up is right, measurement.noise_model: coloured, or --noise-model coloured"

@@ -23,7 +23,7 @@ import numpy as np
 from scipy.special import chdtri
 
 import biogrip.levels as levels
-from biogrip.arrays import Array, IntArray, parts
+from biogrip.arrays import Array, IntArray
 from biogrip.digits import instant, plain
 from biogrip.fit.any_sample import fit_any_sample, fit_responses, spread_lags
 from biogrip.fit.experiment import Experiment
@@ -45,8 +45,6 @@ _LAGS_A_DECADE = 2
 _DELAYS = 65
 # Most readings that an estimate takes of the whole trace, and as many of what the grid spans.
 _MOST_READINGS = 2000
-# Numbers formed together, which should fit a processor's cache.
-_NUMBERS_AT_ONCE = 400_000
 # Least share of the protocol that has to be after the onset.
 _LEAST_AFTER = 0.02
 # Readings after the latest onset, beside one for each parameter.
@@ -82,14 +80,12 @@ def _estimate(
     shortest = float(np.min(np.diff(time_s)))
     lags = spread_lags(torque, time_s, _LAGS_A_DECADE)
 
-    def square_sums(onsets_s: Array, some: IntArray) -> list[float]:
-        nuisance = nuisance_basis(time_s[some], offset=offset, drift=problem.drift)
-        trace, sums = without(nuisance, readings[some]), list[float]()
-        for few in parts(len(onsets_s), max(1, _NUMBERS_AT_ONCE // (len(lags) * len(some)))):
-            # All at once: one call costs more than its numbers.
-            every, place = np.unique(time_s[some] - onsets_s[few, None], return_inverse=True)
-            shown, place = lag_course(torque, lags, every), place.reshape(-1, len(some))
-            sums += [fit_responses(trace, without(nuisance, shown[:, own]))[1] for own in place]
+    def square_sums(onsets_s: Array, chosen: IntArray) -> list[float]:
+        nuisance = nuisance_basis(time_s[chosen], offset=offset, drift=problem.drift)
+        trace, sums = without(nuisance, readings[chosen]), list[float]()
+        for onset_s in onsets_s:
+            shown = lag_course(torque, lags, time_s[chosen] - onset_s)
+            sums.append(fit_responses(trace, without(nuisance, shown))[1])
         return sums
 
     # A reading at the very onset precedes it: the first one, too, may follow it.

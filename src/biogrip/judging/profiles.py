@@ -221,7 +221,9 @@ class QuantityConstraint:
         """Move points, (n, n_parameters), onto the constraint."""
         everyone = np.arange(len(x))
         powers, sense = self._form(everyone)
-        by = (self._targets - self._log(x, powers, sense))[:, None]
+        of_sums = np.logaddexp.reduce(np.where(powers != 0, sense * x, -np.inf), axis=1)[:, None]
+        logs = np.where(sense == 0, np.sum(powers * x, axis=1)[:, None], sense * of_sums)
+        by = self._targets[:, None] - logs
         first = np.cumsum(np.abs(powers), axis=1) * np.abs(powers) == 1
         moved = x + by * np.where(sense == 0, powers * first, powers)
         moved = np.clip(moved, self._low, self._high)
@@ -316,15 +318,6 @@ class QuantityConstraint:
         with np.errstate(divide="ignore", invalid="ignore"):
             of_sum = target + sense * np.log1p(-np.minimum(taken, 1.0))
         return np.where(basic, np.where(sense == 0, of_product, of_sum), x)
-
-    @staticmethod
-    def _log(x: Array, powers: Array, sense: Array) -> Array:
-        """Return the logarithms of quantities with these powers and senses, (n,)."""
-        member = powers != 0
-        largest = np.max(np.where(member, sense * x, -np.inf), axis=1, keepdims=True)
-        terms = np.where(member, np.exp(np.minimum(sense * x - largest, 0.0)), 0.0)
-        of_sum = sense[:, 0] * (largest[:, 0] + np.log(np.sum(terms, axis=1)))
-        return np.where(sense[:, 0] == 0, np.sum(powers * x, axis=1), of_sum)
 
     def _form(self, fit: IntArray) -> tuple[Array, Array]:
         """Return the powers of the members, (n, n_parameters), and each sum's sense, (n, 1)."""

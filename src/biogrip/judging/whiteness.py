@@ -22,7 +22,6 @@ References
 .. [4] H. D. Patterson and R. Thompson, Biometrika 58 (1971), 545-554: restricted likelihood.
 .. [5] F. E. Satterthwaite, Biometrics Bulletin 2 (1946), 110-114.
 .. [6] H. Akaike, IEEE Transactions on Automatic Control 19 (1974), 716-723.
-.. [7] R. A. Fisher, Proceedings of the Royal Society of London A 125 (1929), 54-59.
 .. [8] G. C. Chow, Econometrica 28 (1960), 591-605: equality of two regressions.
 .. [9] D. Siegmund and B. Yakir, The Statistics of Gene Mapping, Springer, 2007: section 5.2.
 """
@@ -45,8 +44,6 @@ from biogrip.physics.residuals import Residuals
 _STRETCHES, _SHORTEST = 20, 5
 # Sums that a misfit is estimated from; correlation lengths and shares of white noise to try.
 _SUMS, _LENGTHS, _WHITE = 200, 10, (0.001, 0.03, 0.2, 0.6)
-# Frequencies of a line are so much finer than the periodogram's.
-_FINER = 16
 
 
 def correlated(residual: Array, basis: Array) -> tuple[float, float]:
@@ -121,28 +118,6 @@ def _chance_of_less(observed: float, first: float, second: float, free: int, mos
     weight = share * (1 - share) / (variance / most**2) - 1
     chance = betainc(share * weight, (1 - share) * weight, min(max(observed / most, 0.0), 1.0))
     return float(chance)
-
-
-def find_line(residual: Array, time_s: Array) -> tuple[float, float, Array]:
-    """Return the frequency of the strongest sine, its chance in white noise, and its directions.
-
-    The chance is that of the largest ordinate of the periodogram [7]_, one where times are not
-    evenly spaced; directions are cosine and sine as orthonormal rows, (2, n_samples).
-    """
-    n, apart = len(residual), np.diff(time_s)
-    if n < 4 * levels.PERIODS or np.ptp(apart) > levels.EVEN * np.median(apart):
-        return 0.0, 1.0, np.zeros((0, n))
-    power = np.abs(np.fft.rfft(residual)[1 : (n + 1) // 2]) ** 2
-    share = np.max(power[levels.PERIODS - 1 :]) / np.sum(power)
-    chance = min(len(power) * float(1 - share) ** (len(power) - 1), 1.0)
-    if chance >= levels.FALSE_ALARM:
-        return 0.0, chance, np.zeros((0, n))
-    fine = np.abs(np.fft.rfft(residual, _FINER * n)[: _FINER * ((n + 1) // 2)]) ** 2
-    slowest = _FINER * levels.PERIODS
-    frequency = (slowest + np.argmax(fine[slowest:])) / (_FINER * n * np.mean(apart))
-    angle = 2 * np.pi * frequency * time_s
-    basis = np.linalg.qr(np.column_stack((np.cos(angle), np.sin(angle))))[0].T
-    return float(frequency), chance, basis
 
 
 def by_leverage(residual: Array, basis: Array) -> Array:
