@@ -235,7 +235,7 @@ KINDS = {
         *("--output", "--report", "--csv", "--plot", "--unit: found", ": goes with --hold"),
         *(" For several there is --report", "takes the shape of a tip"),
         "'; allowed is a table that `biogrip identify --csv` wrote",
-        *("with __use_yte__", "snakemake -j2 --configfile ", "--hold", "--ramp"),
+        *("snakemake -j2 --configfile ", "--hold", "--ramp"),
     ),
 }
 

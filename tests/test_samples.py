@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from biogrip.cli import main
-from biogrip.command.words import agreement_in_words, for_a_paper, set_up_in_words
+from biogrip.command.words import agreement_in_words, set_up_in_words
 
 OPTIONS = ["--reading", "strain", "--model", "zener_kelvin", "--no-compare"]
 
@@ -79,9 +79,6 @@ def test_of_traces_that_agree_the_answer_is_said(folder: Path) -> None:
     assert said.startswith("The 2 traces agree with one linear sample (p = ")
     low, high = map(float, re.findall(r"\((\S+) to (\S+)\) for .*a none 10.csv", said)[0])
     assert low < 1 < high
-    sentences = for_a_paper(found)
-    assert len(sentences) == 4
-    assert all(it.endswith("n = 2 traces of one sample)") for it in sentences)
     assert "under a stress of 5, 10 Pa from" in " ".join(set_up_in_words(found))
     assert {q["quantity"] for q in found["without_model"]["quantities"]} > {"J(10 s)"}
 

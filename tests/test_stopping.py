@@ -14,7 +14,7 @@ from tests.helpers.identified import FEW, write_drop
 BEGIN = """
 import atexit, os, sys, time
 from pathlib import Path
-from biogrip.processes import end_when_stopped
+from biogrip.terminal import end_when_stopped
 def stop():
     print("said before")
     os.kill(os.getpid(), {number})
@@ -111,7 +111,7 @@ def test_it_can_be_stopped_before_it_loads_anything_large(tmp_path: Path) -> Non
     code = "import sys; b = {*sys.modules}; import biogrip.__main__; print(*{*sys.modules} - b)"
     loaded = set(ended(code, tmp_path)[1].split())
     ours = {name for name in loaded if name.startswith("biogrip")}
-    assert ours == {"biogrip", "biogrip.__main__", "biogrip.processes", "biogrip.terminal"}
+    assert ours == {"biogrip", "biogrip.__main__", "biogrip.terminal"}
     assert not {"argparse", "json", "typing", "hashlib", "pathlib"} & loaded
 
 

@@ -16,11 +16,12 @@ from biogrip.cli import _parser
 from biogrip.command.settings import Asked, read_trace
 from biogrip.command.words import set_up_in_words
 from biogrip.errors import BiogripError
-from biogrip.fit.swept_noise import estimate_swept_noise
+from biogrip.fit.share_noise import estimate_swept_noise
+from biogrip.fit.trace_noise import PairWhitening
 from biogrip.judging.whiteness import find_inertia
 from biogrip.library import INSTRUMENTS, Sample, hold, set_up, simulate
 from biogrip.physics.models import MODELS
-from biogrip.physics.noise import PairWhitening, moduli_of, places_of
+from biogrip.physics.noise import moduli_of, places_of
 from biogrip.physics.protocol import joined
 from tests.helpers.default import seen
 from tests.helpers.identified import by_quantity, identified, identify, told, write_trace

@@ -29,8 +29,8 @@ from biogrip.app.choices import (
 from biogrip.app.server import _SHOWN, app_of
 from biogrip.app.window import Window
 from biogrip.cli import main
+from biogrip.files import read_table
 from biogrip.physics.models import CANDIDATES, MODELS
-from biogrip.records import read_table
 from biogrip.traces.tables import numbers_in, overview
 from tests.helpers.browser import Opened
 from tests.helpers.identified import write_trace

@@ -12,13 +12,11 @@ from biogrip.figures.likelihood import draw_profile, draw_profiles_of
 from biogrip.figures.style import figure, save, styled
 from biogrip.physics.instruments import MODULUS
 from biogrip.physics.models import MODELS
-from biogrip.records import write_object
 from biogrip_study.figures.case_fit import draw_fits
-from biogrip_study.figures.course import draw_convergence, draw_scatter
+from biogrip_study.figures.course import draw_convergence
 from biogrip_study.methods.registry import METHODS
 from biogrip_study.records.rows import write_arrays
 from biogrip_study.records.traces import Measurements, write_measurements
-from biogrip_study.stages import targets
 from tests.helpers.default import STUDY, study_of
 from tests.helpers.problems import rotation
 from workflow.paper.gripper import draw_torque
@@ -98,32 +96,6 @@ def test_no_more_seeds_are_drawn_than_can_be_seen(tmp_path: Path) -> None:
         colors = [line.get_color() for line in axes.lines if len(np.asarray(line.get_xdata()))]
         assert [colors.count(each) for each in (style.ALL_SEEDS, *style.RUNS)] == [others, 1, 1]
         assert legend.get_texts()[0].get_text() == label
-
-
-def scattered(overlay: str, identifications: Path) -> Any:
-    """Of a case of which the sum alone is determined."""
-    folder, case = identifications.parent, study_of(f"{FEW}{overlay}").cases[CASE]
-    targets.simulate_target(case, folder / "target.csv")
-    verdicts = dict.fromkeys(["k", "k_p", "c", "c_p"], "not determined")
-    verdicts["c + c_p"] = "determined"
-    items = [{"quantity": name, "verdict": verdict} for name, verdict in verdicts.items()]
-    write_object(folder / "expected.json", {"quantities": items, "trades": [], "notes": []})
-    with styled():
-        files = identifications, folder / "target.csv", folder / "expected.json"
-        return draw_scatter(case, *files)
-
-
-def test_bands_of_the_confidence_are_drawn_of_what_is_determined(identifications: Path) -> None:
-    drawn = scattered("", identifications)
-    shaded = [any(isinstance(p, Rectangle) for p in axes.patches) for axes in drawn.axes]
-    assert shaded == [False] * 4 + [True]
-    assert drawn.axes[2].get_yscale() == "log"
-    # 1e-6 of 1 is below four decades: one triangle on the edge.
-    triangles = [line for line in drawn.axes[0].lines if line.get_marker() == "v"]
-    assert [len(np.asarray(line.get_xdata())) for line in triangles] == [1]
-    narrow = scattered("identifiability: {confidence: 0.6827}", identifications)
-    wide, small = (float(f.axes[4].patches[0].get_extents().height) for f in (drawn, narrow))
-    assert wide / small == pytest.approx(1.96, rel=1e-3)
 
 
 def test_a_set_in_two_parts_is_shaded_in_two_parts() -> None:

@@ -9,6 +9,7 @@ from scipy.signal import lfilter
 from scipy.stats import chi2
 
 from biogrip.command.words import in_words
+from biogrip.fit.trace_noise import NoiseModel
 from biogrip.judging.doubts import (
     DOUBT,
     DOUBTFUL,
@@ -24,7 +25,7 @@ from biogrip.judging.likelihood import Likelihood, make_likelihood
 from biogrip.judging.whiteness import as_correlated
 from biogrip.library import identify_trace
 from biogrip.physics.instruments import INSTRUMENTS
-from biogrip.physics.noise import AR1, Noise, NoiseModel, Outliers, add_noise
+from biogrip.physics.noise import AR1, Noise, Outliers, add_noise
 from tests.helpers.default import seen
 from tests.helpers.identified import told
 from tests.helpers.places import ROOT

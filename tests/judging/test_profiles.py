@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array, IntArray
-from biogrip.fit.least_squares import FINE
-from biogrip.fit.levenberg_marquardt import Normal
+from biogrip.fit.least_squares import FINE, Normal
 from biogrip.fit.trace_fit import TraceFit
 from biogrip.judging.diagnosis import diagnose
 from biogrip.judging.doubts import DOUBT, RING, Note

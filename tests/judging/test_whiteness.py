@@ -8,10 +8,10 @@ from scipy.stats import f as fisher
 from scipy.stats import t as student
 
 from biogrip.arrays import Array
-from biogrip.fit.noise_model_fit import absorbed, outliers_of
+from biogrip.fit.trace_noise import absorbed, outliers_of
 from biogrip.judging import whiteness
 from biogrip.judging.doubts import DOUBTFUL
-from tests.fit.test_noise_model_fit import restricted
+from tests.fit.test_trace_noise import restricted
 from tests.helpers.identified import told
 
 LEVEL = 0.01

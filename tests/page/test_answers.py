@@ -1,16 +1,6 @@
-from typing import Any
-
-from biogrip.physics.models import CANDIDATES
 from biogrip_study.page import answers
 
 TITLES = {"cell": "A cell", "drop": "A drop"}
-
-
-def verdict(case: str, quantity: str, told: str = "determined") -> dict[str, str]:
-    return {"case": case, "quantity": quantity, "verdict": told}
-
-
-VERDICTS = [verdict("drop", "k", "not determined"), verdict("drop", "c")]
 
 
 def covered(case: str, quantity: str, hits: str, runs: str = "20") -> dict[str, str]:
@@ -48,62 +38,3 @@ def test_the_surest_method_is_named_before_the_study_s_own() -> None:
     )
     assert answers.say_which_method_finds_it([], OWN) == ""
     assert answers.say_what_the_study_gives(METHODS, "other", TITLES, "The", 1.0) == ""
-
-
-def test_medians_stand_beside_targets() -> None:
-    """With errors of a run; no median between humps, no row that no trace determines."""
-    row = {"case": "drop", "unit": "N s/m", "target": "0.001", "seeds": "50", "basin": "all"}
-    row |= {"median_identified": "0.0039", "p25_identified": "0.001", "p75_identified": "0.0051"}
-    row |= {"parameter": "c", "median_absolute_error_percent": "290.4"}
-    every = [row, row | {"parameter": "c_p"}]
-    (found,) = answers.compared_rows(every, VERDICTS, TITLES)
-    assert [text.replace("\xa0", " ") for text in found.values()] == [
-        *("A drop", "c (N s/m)", "0.001", "0.0039 (290 %)", "0.001 to 0.0051")
-    ]
-    (humps,) = answers.compared_rows([row | {"p25_identified": "1.1e-05"}], VERDICTS, TITLES)
-    assert humps["this study: median"] == "spread over decades"
-    near = row | {"basin": "near the noise", "seeds": "23"}
-    assert answers.compared_rows([row, near], VERDICTS, TITLES) == [found]
-
-
-def recorded(fit: str, **verdicts: str) -> dict[str, Any]:
-    found = [verdict("", *told) | {"provided": None} for told in verdicts.items()]
-    return {"fit": fit, "quantities": found}
-
-
-def test_a_recorded_trace_has_a_sentence_and_several_have_shares() -> None:
-    told = {"k": "determined", "k_p": "bounded above", "c": "determined", "c_p": "determined"}
-    one = recorded("doubtful", **told)
-    one["quantities"][3]["provided"] = "it relaxes"
-    assert answers.say_what_recordings_tell([one]) == (
-        "This trace determines k, c and c_p (provided it relaxes); it bounds from above only k_p. "
-        "Of the fits, 1 doubtful."
-    )
-    other = recorded("rejected", k="fit rejected", k_p="fit rejected")
-    assert answers.say_what_recordings_tell([one, recorded("ok", k="determined"), other]) == (
-        "Of 3 traces, k is determined in 2, k_p is determined in 0, c is determined in 1 and c_p "
-        "is determined in 1. Of the fits, 1 doubtful and 1 rejected."
-    )
-    assert answers.say_what_recordings_tell([other]).startswith("The model cannot give this trace")
-    assert answers.say_what_recordings_tell([]) == ""
-
-
-def test_a_better_model_is_named_with_what_it_gains() -> None:
-    """By the words of `identify`; 4 and 2 parameters, and ΔAIC as of 800 readings."""
-    full, maxwell = "generalized_maxwell", "maxwell"
-    rows = [
-        {"case": case, "model": CANDIDATES[name].model.title}
-        | {"median_delta_aic": aic, "median_delta_bic": bic}
-        for case, name, aic, bic in (
-            *(("a", full, "4", "13.4"), ("a", maxwell, "0", "0")),
-            *(("b", full, "0", "0"), ("b", maxwell, "89", "80")),
-        )
-    ]
-    for case, own, fit, said in (
-        ("a", full, "ok", "(--model maxwell), fits as well, with a BIC lower by 13.4."),
-        ("b", maxwell, "ok", "(--model generalized_maxwell) is preferred, with a BIC lower by 80."),
-        *(("a", full, "rejected", ""), ("b", full, "ok", ""), ("c", full, "ok", "")),
-    ):
-        told = answers.say_which_model_is_better(rows, case, own, fit)
-        assert told.endswith(said)
-        assert bool(told) == bool(said)

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from biogrip.digits import legible
-from biogrip.records import read_table
+from biogrip.files import read_table
 from biogrip_study.config.study import load_given_study
 from biogrip_study.page import answers
-from biogrip_study.page.page import entry_of, write_report
+from biogrip_study.page.page import write_report
 from biogrip_study.records.identifications import read_verdicts
 from tests.helpers.browser import Opened
 from tests.helpers.links import links_of
@@ -99,7 +99,7 @@ def test_the_page_answers_first_and_from_its_tables(opened: Opened, report: Path
     captions = [text.split(". ", 1)[1] for text in map(str.strip, told) if ". " in text]
     assert len(captions) == len(set(captions)) > 5
     shown = page.locator("figure:visible").evaluate_all("all => all.map(f => f.id)")
-    assert shown == ["sliders", "figure-answer", "figure-fit_liquid_drop_2"]
+    assert shown == ["sliders", "figure-fit_liquid_drop_2"]
 
 
 def test_menu_links_land_where_they_say(visit: Any, report: Path) -> None:
@@ -211,16 +211,6 @@ def test_c_moves_against_c_p_and_nothing_is_seen(opened: Opened) -> None:
     page.locator("#sliders input[type=checkbox]").check()
 
 
-def test_a_table_is_of_the_case_that_its_name_ends_with() -> None:
-    captions = {("tables", known): known for known in ("errors", "contact_loss", "contact")}
-    for name, whose in (("errors", "cell"), ("errors", "soft_cell"), ("contact_loss", "")):
-        file = Path(f"results/tables/{name}{'_' * bool(whose)}{whose}.csv")
-        titles = {"cell": "A cell", "soft_cell": "A soft cell", "loss": "A loss"}
-        entry = entry_of(file, titles, captions)
-        assert (entry.name, entry.whose, entry.caption) == (name, whose, name)
-        assert entry.title == name.capitalize().replace("_", " ") + (whose and f": {titles[whose]}")
-
-
 def test_summaries_are_whole_and_legible(visit: Any, tiny: Path) -> None:
     for name in ("liquid_drop_2", "mine"):
         opened = visit(tiny / f"results/summaries/{name}.html", viewport=PHONE)
@@ -234,22 +224,26 @@ def test_a_study_of_one_s_own_has_a_page_without_the_paper(
 ) -> None:
     monkeypatch.chdir(tiny)
     study, results = load_given_study(TINY, []).of(["mine"]), tiny / "results"
-    names = ("errors_mine", "verdicts_mine", "models", "gene_ranges", "left_out")
-    tables = [results / "tables" / f"{name}.html" for name in names]
+    items = [("errors", "mine"), ("verdicts", "mine"), ("models", ""), ("left_out", "")]
+    tables = [results / "tables" / f"{'_'.join(filter(None, item))}.html" for item in items]
+    figures = sorted(results.glob("figures/*_mine.png"))
+    shown = [*((path.stem.removesuffix("_mine"), "mine") for path in figures), ("comb", "")]
     files = {
-        "figures": [*sorted(results.glob("figures/*_mine.png")), results / "figures" / "comb.png"],
+        "figures": [*figures, results / "figures" / "comb.png"],
         "tables": tables,
         "downloads": [path.with_suffix(".csv") for path in tables],
         "captions": sorted((ROOT / "workflow" / "report").glob("*/*.rst")),
         "verdicts": [results / "identifiability" / "mine.json"],
         "measurements": [results / "measurements" / "mine" / "seeds_0-0.npz"],
     }
-    write_report(study, **files, page=tmp_path / "page.html", front=tmp_path / "front.html")
+    listed = {"figures": shown, "tables": items}
+    page_file, front = tmp_path / "page.html", tmp_path / "front.html"
+    write_report(study, shown=listed, **files, page=page_file, front=front)
     assert not re.search("of the paper|[Pp]aper's", (tmp_path / "page.html").read_text("utf-8"))
     page = visit(tmp_path / "page.html", viewport=PHONE).page
     assert page.locator("h1").inner_text() == page.title() == "A trace of mine"
     end = "it => it.getBoundingClientRect().bottom"
-    assert page.locator(".answers p").evaluate(end) < PHONE["height"]
+    assert page.locator("dl").evaluate(end) < PHONE["height"]
     told = read_verdicts(files["verdicts"][0])
     said = page.locator("dd:visible").all_inner_texts()
     assert [legible(item["in_words"]) for item in told["quantities"]] == said

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
+from biogrip.fit.trace_noise import NoiseModel, Whitening
 from biogrip.physics import modes
 from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import NO_ARMS
 from biogrip.physics.models import MODELS
 from biogrip.physics.modes import linear_responses
-from biogrip.physics.noise import NoiseModel, Whitening, nuisance_basis
+from biogrip.physics.noise import nuisance_basis
 from biogrip.physics.protocol import (
     Course,
     evaluate,

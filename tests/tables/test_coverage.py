@@ -1,14 +1,17 @@
 import re
+from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.stats import binomtest
 
 from biogrip.errors import BiogripError
+from biogrip.files import read_rows, write_object
 from biogrip.physics.response import step_response, superpose
-from biogrip.records import read_rows, write_object
 from biogrip_study.gripper.calibration import calibration_yaml
 from biogrip_study.records.identifications import INTERVALS
 from biogrip_study.stages import judgement as stage
@@ -32,25 +35,36 @@ def target(tmp_path: Path) -> Path:
     return tmp_path / "target.csv"
 
 
-def test_verdicts_are_counted_beside_intervals(tmp_path: Path, target: Path) -> None:
+def write_intervals(file: Path, rows: list[tuple[Any, ...]], quantities: Sequence[str]) -> Path:
+    """With a row of nothing for quantities and seeds that have none."""
+    seeds = {row[2] for row in rows}
+    given = {row[1:3] for row in rows}
+    lacking = [one for one in product(quantities, seeds) if one not in given]
+    INTERVALS.write(file, [*rows, *((file.parent.name, *one, *[""] * 6) for one in lacking)])
+    return file
+
+
+QUANTITIES = "k", "k_p", "c", "c_p", "c + c_p"
+
+
+def test_verdicts_are_counted_beside_intervals(tmp_path: Path) -> None:
     rows = [
         # Of k = 1 three intervals, two of which hold it; two seeds judged in full.
-        (CASE, "k", 0, 1.01, 0.9, 1.1, 1.0, "determined", 1.005, 1.2),
-        (CASE, "k", 1, 1.02, 0.9, 1.2, 1.01, "", "", ""),
-        (CASE, "k", 2, 1.3, 1.1, 1.5, 1.0, "bounded below", 0.95, ""),
+        (CASE, "k", 0, 1.01, 0.9, 1.1, "determined", 1.005, 1.2),
+        (CASE, "k", 1, 1.02, 0.9, 1.2, "", "", ""),
+        (CASE, "k", 2, 1.3, 1.1, 1.5, "bounded below", 0.95, ""),
         # c_p = 1e-3 is only judged in full.
-        (CASE, "c_p", 0, 0.1, "", "", "", "bounded above", "", 0.5),
-        (CASE, "c_p", 2, 0.1, "", "", "", "bounded above", "", 0.5e-3),
+        (CASE, "c_p", 0, "", "", "", "bounded above", "", 0.5),
+        (CASE, "c_p", 2, "", "", "", "bounded above", "", 0.5e-3),
         # k_p = 1e-4 is below the range that is searched, and the limit between the two.
-        (CASE, "k_p", 0, 0.1, "", "", "", "bounded above", "", 1.05e-4),
-        (CASE, "k_p", 2, 0.1, "", "", "", "not determined", "", ""),
+        (CASE, "k_p", 0, "", "", "", "bounded above", "", 1.05e-4),
+        (CASE, "k_p", 2, "", "", "", "not determined", "", ""),
     ]
-    untold = 0.1, "", "", "", "not determined", "", ""
+    untold = "", "", "", "not determined", "", ""
     rows += [(CASE, quantity, seed, *untold) for seed in (0, 2) for quantity in ("c", "c + c_p")]
-    file = tmp_path / CASE / "seeds_0-2.csv"
-    INTERVALS.write(file, rows)
+    file = write_intervals(tmp_path / CASE / "seeds_0-2.csv", rows, QUANTITIES)
     every_other = study_of(OVERLAY.replace("0.9}", "0.9, verdicts_every: 2}"))
-    made = coverage(every_other, [target], [file])
+    made = coverage(every_other, [file])
     found = {row["quantity"]: row for row in made.rows}
     assert list(found) == ["k", "k_p", "c_p"]
     assert (found["k_p"]["target"], found["k_p"]["shown_one_sided_true"]) == (1e-4, 1)
@@ -70,11 +84,11 @@ def test_verdicts_are_counted_beside_intervals(tmp_path: Path, target: Path) -> 
         with pytest.raises(
             BiogripError, match=r"seeds_0-2.csv: found \d+ rows, wanted .* --forcerun"
         ):
-            coverage(every_other, [target], [file])
+            coverage(every_other, [file])
 
 
 def test_verdicts_of_every_seed_are_counted(tmp_path: Path) -> None:
-    empty = ("", "", "", "")
+    empty = ("", "", "")
     rows = [
         # Of k = 1 two intervals within a factor of 3, one of which holds it, and one that is wider.
         (CASE, "k", 0, *empty, "determined", 0.9, 1.1),
@@ -123,20 +137,16 @@ def test_the_bound_of_a_case_is_that_of_its_calibration(tmp_path: Path) -> None:
         arm = replace(study.gripper.left, stiffness_Nm_per_rad=stiffness[name])
         arms = {"left": arm, "right": arm}
         (tmp_path / f"{name}.yaml").write_text(calibration_yaml(arms, arms))
-        rows = [(name, "k", seed, 35.1, 34, 36, 35.2, "", "", "") for seed in (1, 2)]
-        INTERVALS.write(tmp_path / name / "seeds_1-2.csv", rows)
-        targets.simulate_target(case, tmp_path / f"{name}.csv")
+        rows = [(name, "k", seed, 35.1, 34, 36, "", "", "") for seed in (1, 2)]
+        write_intervals(tmp_path / name / "seeds_1-2.csv", rows, ("k", "k_p", "c"))
         thought = step_response(replace(study.gripper, left=arm, right=arm), network)
         above, below = np.split(superpose(thought, TORQUE, case.times_s), 2)
         slopes = (above - below) / 2e-5
         sigma = 0.1 * rotation(MODEL, CELL, case.times_s).max()
         bounds[name] = 100 * sigma * np.sqrt(np.linalg.inv(slopes @ slopes.T)[0, 0])
-    made, batches = (
-        [tmp_path / file.format(name) for name in study.cases]
-        for file in ("{}.csv", "{}/seeds_1-2.csv")
-    )
+    batches = [tmp_path / name / "seeds_1-2.csv" for name in study.cases]
     calibrations = {name: tmp_path / f"{name}.yaml" for name in study.cases}
-    table = coverage(replace(study, calibrations=calibrations), made, batches)
+    table = coverage(replace(study, calibrations=calibrations), batches)
     assert {row["case"]: row["bound_percent"] for row in table.rows} == pytest.approx(
         bounds, rel=1e-4
     )
@@ -150,6 +160,7 @@ def test_some_seeds_are_judged_in_full(tmp_path: Path, target: Path) -> None:
     stage.estimate_intervals(case, range(2, 5), target, expected, tmp_path / "i.csv")
     found = INTERVALS.read(tmp_path / "i.csv")
     assert set(found["seed"]) == {2, 3, 4}
+    assert len(found) == 15
     whole = found[found["verdict"].notna()]
     assert whole["seed"].tolist() == [3] * 5
     assert whole["quantity"].tolist() == ["k", "k_p", "c", "c_p", "c + c_p"]
@@ -198,24 +209,21 @@ def test_the_bound_of_a_case_is_of_its_own_calibration(tmp_path: Path) -> None:
     """An arm a thousand times stiffer leaves less of a cell to be seen."""
     study = study_of("{measurement: {rate_Hz: 1.0}, cases: {endothelial_cell: null}}")
     arm = study.cases[CASE].gripper.left
-    files, of_targets, batches = {}, [], []
+    files, batches = {}, []
     for name, times in (("liquid_drop_1", 1.0), (CASE, 1000.0)):
         stiff = replace(arm, stiffness_Nm_per_rad=times * arm.stiffness_Nm_per_rad)
         files[name] = tmp_path / f"{name}.yaml"
         arms, known = ({"left": both, "right": both} for both in (stiff, arm))
         files[name].write_text(calibration_yaml(arms, known))
-        of_targets.append(tmp_path / f"{name}.csv")
-        targets.simulate_target(study.cases[name], of_targets[-1])
         batches.append(tmp_path / name / "seeds_0-1.csv")
-        every = ("k", "k_p", "c", "c_p", "c + c_p")
-        rest = 1.0, 0.9, 1.1, 1.0, "determined", 0.9, 1.1
-        seeds = [(name, q, seed, *rest) for seed in range(2) for q in every]
+        rest = 1.0, 0.9, 1.1, "determined", 0.9, 1.1
+        seeds = [(name, q, seed, *rest) for seed in range(2) for q in QUANTITIES]
         INTERVALS.write(batches[-1], seeds)
     study = replace(study, calibrations=files)
-    rows = coverage(study, of_targets, batches).rows
-    for name, of_target in zip(study.cases, of_targets, strict=True):
+    rows = coverage(study, batches).rows
+    for name, case in study.cases.items():
         (shown,) = (row for row in rows if (row["case"], row["quantity"]) == (name, "c + c_p"))
-        alone = bounds_at_truth(study.cases[name], of_target)
-        assert shown["bound_percent"] == pytest.approx(100 * alone["c + c_p"])
+        alone = {quantity.label: percent for quantity, percent in bounds_at_truth(case)}
+        assert shown["bound_percent"] == pytest.approx(alone["c + c_p"])
     ends = [row["bound_percent"] for row in rows if row["quantity"] == "c + c_p"]
     assert ends[1] > 10 * ends[0]

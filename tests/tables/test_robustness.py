@@ -2,12 +2,14 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 
-from biogrip.records import write_rows
+from biogrip.files import write_rows
+from biogrip.judging.likelihood import bounds_percent
 from biogrip_study.records.identifications import identification_columns
+from biogrip_study.stages.targets import noise_of_readings
 from biogrip_study.tables import sweeps as stage
+from biogrip_study.tables.study import bounds_at_truth
 from biogrip_study.tables.sweeps import headlines, robustness
 from tests.helpers.default import study_of
 from tests.helpers.problems import MODEL, rotation
@@ -37,7 +39,7 @@ STUDY = study_of(SWEEPS)
 
 
 @pytest.fixture(scope="module")
-def judged(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def batches(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     """Five seeds: k = 0.7, 0.8, 0.9, 1, 0.3 of 35 and c = 330, c_p = 1; misfits 1 to 1.04 noise."""
     folder, files = tmp_path_factory.mktemp("sweep"), []
     # The truth with two digits of 1 to 9: 300 has none.
@@ -52,53 +54,63 @@ def judged(tmp_path_factory: pytest.TempPathFactory) -> Path:
         files.append(folder / name / method / "seeds_0-4.csv")
         files[-1].parent.mkdir(parents=True)
         write_rows(files[-1], identification_columns(MODEL), rows)
-    stage.judge_points(STUDY, "both", files, folder / f"{CASE}.csv")
-    return folder / f"{CASE}.csv"
+    return files
 
 
-@pytest.fixture(scope="module")
-def points(judged: Path) -> pd.DataFrame:
-    rows = pd.read_csv(judged, dtype={"row": str, "column": str})
-    assert tuple(rows.columns) == stage.POINTS.columns
-    assert len(rows) == 4 * 2 * 5
-    return rows.set_index(["row", "column", "method", "quantity"]).sort_index()
-
-
-def test_judged_points_are_the_arithmetic_they_say(points: pd.DataFrame) -> None:
-    noisy = points.loc[("20", "additive, any", "genetic")]
+def test_judged_points_are_the_arithmetic_they_say(batches: list[Path]) -> None:
+    of_level = {
+        name.split("--")[2]: name for name in STUDY.points if name.endswith("gaussian-peak")
+    }
+    judged = {}
+    for level, name in of_level.items():
+        case = STUDY.points[name]
+        bounds = {q.label: bound for q, bound in bounds_at_truth(case)}
+        assert {*np.isnan([*bounds.values()])} == {level == "0"}
+        judged[level] = stage.judge_point(case, bounds, ["k", "k_p", "c + c_p"], batches)
+    noisy = judged["0_2"]
     # |35 - k| / 35: 0, 10, 20, 30 and 70 %, the last outside a factor of two.
-    assert noisy.loc["k", "median_absolute_error_percent"] == pytest.approx(20.0)
-    assert noisy.loc["k", "basin_error_percent"] == pytest.approx(15.0)
-    assert (noisy["basin_share"] == 0.8).all()
+    assert noisy["k"]["error_genetic"] == pytest.approx(20.0)
+    assert noisy["k"]["basin_error_genetic"] == pytest.approx(15.0)
+    assert {row["basin_genetic"] for row in noisy.values()} == {0.8}
     total = 100 * (331 - 299.901) / 299.901
-    assert noisy.loc["c + c_p", "median_absolute_error_percent"] == pytest.approx(total, rel=1e-5)
+    assert noisy["c + c_p"]["error_genetic"] == pytest.approx(total, rel=1e-5)
     # 1, 1.01 and 1.02 times the noise are within 2 % of it, or of what two digits can do.
-    assert noisy.loc["k", "near_noise_share"] == 0.6
-    assert (noisy["seeds"] == 5).all()
-    assert points.loc["0", "bound_percent"].isna().all()
-    for method, share in (("genetic", 0.6), ("least_squares", 1.0)):
-        assert (points.loc[("0", slice(None), method), "near_noise_share"] == share).all()
+    for told in judged.values():
+        assert told["k"]["near_noise_genetic"] == 0.6
+        assert told["k"]["near_noise_least_squares"] == 1.0
 
 
-@pytest.mark.parametrize("column", ["additive, any", "proportional"])
-def test_bounds_are_those_of_least_squares(points: pd.DataFrame, column: str) -> None:
+@pytest.mark.parametrize("column", ["gaussian-peak", "uniform-signal"])
+def test_bounds_are_those_of_least_squares(column: str) -> None:
     """The sandwich covariance of log k, log k_p, log c from central differences."""
-    found = points.loc[("20", column, "genetic"), "bound_percent"]
+    (case,) = (of for name, of in STUDY.points.items() if name.endswith(f"--0_2--{column}"))
+    found = {quantity.label: bound for quantity, bound in bounds_at_truth(case)}
     above, below = (
         np.array([rotation(MODEL, TRUTH * np.exp(h), TIME_S) for h in away * np.eye(4)[:3]])
         for away in (1e-5, -1e-5)
     )
     phi, jacobian = rotation(MODEL, TRUTH, TIME_S), (above - below) / 2e-5
-    sigma = 0.2 * (np.full_like(phi, phi.max()) if column == "additive, any" else np.abs(phi))
+    sigma = 0.2 * (np.full_like(phi, phi.max()) if column == "gaussian-peak" else np.abs(phi))
     errors = np.linalg.solve(jacobian @ jacobian.T, jacobian * sigma)
     wanted = 100 * np.linalg.norm(errors, axis=1)
-    np.testing.assert_allclose(found[["k", "k_p", "c"]], wanted, rtol=1e-3)
+    np.testing.assert_allclose([found[q] for q in ("k", "k_p", "c")], wanted, rtol=1e-3)
     # Of c_p = 1e-3 beside c = 299.9 the trace carries no information.
     assert np.isinf(found["c_p"])
 
 
-def test_the_table_has_the_best_and_the_worst_determined(judged: Path) -> None:
-    rows = robustness(STUDY, "both", judged).rows
+def test_bounds_are_of_the_noise_that_traces_have_whatever_gripper_is_assumed() -> None:
+    """Arms that are thought twice as stiff would turn less, and the noise of the peak is less."""
+    off = "{left: {stiffness_Nm_per_rad: 8.8e-7}, right: {stiffness_Nm_per_rad: 8.8e-7}}"
+    case = study_of(f"cases: {{{CASE}: {{assumed_gripper: {off}}}}}").cases[CASE]
+    level = float(noise_of_readings(case, case.times_s)[0])
+    stated = np.full_like(case.times_s, level)
+    same = bounds_percent(case.experiment, stated, case.parameters, case.times_s)
+    assert bounds_at_truth(case) == same
+    assert level == pytest.approx(0.1 * rotation(MODEL, TRUTH, TIME_S).max())
+
+
+def test_the_table_has_the_best_and_the_worst_determined(batches: list[Path]) -> None:
+    rows = robustness(STUDY, "both", batches).rows
     levels, kinds = ("0", "20"), ("additive, any", "proportional")
     wanted = [*product(("k_p", "k"), levels, kinds)]
     assert [(row["quantity"], row["row"], row["column"]) for row in rows] == wanted

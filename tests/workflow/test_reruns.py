@@ -10,7 +10,7 @@ from tests.helpers.runs import SMALL, TINY, clone, dry_run, jobs_of, planned, re
 
 # What puts all cases together, whatever changed, and what compares their identifications.
 TOLD = {"claims": 1, "page": 1}
-COMPARED = TOLD | dict.fromkeys(("errors", "methods", "moduli", "overview"), 1)
+COMPARED = TOLD | dict.fromkeys(("errors", "methods", "overview"), 1)
 # Of a simulated case, from its traces to their judgement, with one batch of them; and what of the
 # study reads these.
 TRACES = {"measurement": 1, "identification": 2, "model_fits": 1, "intervals": 1, "judgement": 1}
@@ -28,7 +28,6 @@ CHANGES: dict[str, tuple[dict[str, Any], dict[str, int]]] = {
         {"measurement": {"noise": {"level": 0.2}}},
         TRACES
         | {"recorded_judgement": 1, "mechanics": 1, "case_tables": 1, "case_verdicts": 2}
-        | {"answer": 1}
         | DRAWN
         | COMPARED,
     ),
@@ -80,18 +79,8 @@ def test_a_table_and_a_figure_take_the_jobs_whose_files_they_need(tmp_path: Path
     """Of one sample and two methods: no intervals, no models, no verdicts."""
     identified = {"target": 1, "measurement": 1, "identification": 2, "case_tables": 1}
     config = SMALL | {"only": ["liquid_drop_2"]}
-    for target, rule in (("tables/errors.csv", "errors"), ("figures/moduli.png", "moduli")):
+    for target, rule in (("tables/errors.csv", "errors"), ("tables/methods.csv", "methods")):
         assert planned(tmp_path, f"results/{target}", config=config) == {**identified, rule: 1}
-
-
-@pytest.mark.parametrize(
-    ("fixed", "drawn"), [({"k_p": 1.0}, 1), ({"k_p": 1.0, "k": 1.0}, 0), ({"c_p": 0.1}, 0)]
-)
-def test_two_dampers_are_shown_that_trade_beside_another_that_is_searched(
-    tmp_path: Path, fixed: dict[str, float], drawn: int
-) -> None:
-    jobs = planned(tmp_path, config=SMALL | {"only": ["liquid_drop_2"], "fixed": fixed})
-    assert jobs.get("answer", 0) == drawn
 
 
 def test_a_dry_run_says_which_setting_changed_from_what_to_what(tiny: Path) -> None:

@@ -25,9 +25,8 @@ from biogrip.judging.likelihood import bounds_percent
 from biogrip.judging.profiles import DETERMINED
 from biogrip.levels import DETERMINED_PERCENT
 from biogrip.physics.gripper import ARM_KEYS, Gripper
-from biogrip.physics.noise import Noise, add_noise, rms, standard_deviation, stream
+from biogrip.physics.noise import Noise, add_noise, stream
 from biogrip.physics.protocol import sample_times
-from biogrip.physics.simulation import simulated_response
 from biogrip_study.config.study import Case, Study
 from biogrip_study.gripper.calibration import calibrate, free_motion
 from biogrip_study.records.identifications import (
@@ -39,6 +38,7 @@ from biogrip_study.records.identifications import (
 )
 from biogrip_study.records.rows import RowFile
 from biogrip_study.stages.job import job_study, logged, paths
+from biogrip_study.stages.targets import noise_of_readings
 from biogrip_study.tables.cases import value_in_case
 from biogrip_study.tables.layout import Column, Row, ShownTable, titled, write
 
@@ -272,13 +272,11 @@ def judge_grippers(
     """
     judged = []
     for case in results.study.cases.values():
-        device = case.gripper, case.network, case.torque
-        reading = simulated_response(*device, case.times_s)[0]
-        noise = replace(case.noise, level_rad=rms(standard_deviation(reading, case.noise)))
+        noise_sd = noise_of_readings(case, case.times_s)
         every = []
         for gripper in (case.gripper, *others(results, case.gripper)):
             problem = replace(case.experiment, gripper=gripper)
-            bounds = bounds_percent(problem, noise, case.parameters, case.times_s)
+            bounds = bounds_percent(problem, noise_sd, case.parameters, case.times_s)
             every.append([bound for _, bound in bounds])
         told = np.array(every)[:, np.array(every[0]) < DETERMINED_PERCENT]
         factor = float(np.max(told.max(axis=0) / told.min(axis=0)))

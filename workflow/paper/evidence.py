@@ -21,6 +21,7 @@ from biogrip_study.config.study import Case, Study
 from biogrip_study.methods.genome import encodable_values, nearest_encodable
 from biogrip_study.records.traces import read_measurements
 from biogrip_study.stages.job import job_study, logged, paths
+from biogrip_study.stages.targets import noise_of_readings
 from biogrip_study.tables.cases import error_percent, value_in_case
 from biogrip_study.tables.layout import Column, Row, ShownTable, titled, write
 
@@ -204,13 +205,14 @@ def _errors_and_bounds(case: Case) -> list[tuple[Any, ...]]:
     Errors are the paper's, and the lowest and the highest that it may have printed so.
     """
     truth, identified = case.parameters, case.published.identified
-    problem, noise = case.experiment, case.noise
+    problem = case.experiment
     names = list(problem.searched.names)
     times = [sample_times(problem.torque.end_s, rate) for rate in _RATES_HZ]
-    at_truth = [bounds_percent(problem, noise, truth, time_s) for time_s in times]
+    sampled = [(noise_of_readings(case, time_s), time_s) for time_s in times]
+    at_truth = [bounds_percent(problem, sd, truth, time_s) for sd, time_s in sampled]
     shown = [quantity for quantity, _ in at_truth[0]]
     if set(names) <= set(identified):
-        shown = _drop_redundant(bounds_percent(problem, noise, identified, times[-1]))
+        shown = _drop_redundant(bounds_percent(problem, sampled[-1][0], identified, times[-1]))
     found: list[tuple[Any, ...]] = []
     for index, (quantity, _) in enumerate(at_truth[0]):
         bounds = [at_rate[index][1] for at_rate in at_truth]

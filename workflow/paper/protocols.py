@@ -13,15 +13,15 @@ from matplotlib.figure import Figure
 
 from biogrip.arrays import Array
 from biogrip.figures.style import BLACK, BLUE, ORANGE, PAGE_IN, SHADE, figure, panel, save, styled
-from biogrip.judging.likelihood import bounds_percent
 from biogrip.levels import DETERMINED_PERCENT
-from biogrip.physics.noise import standard_deviation
-from biogrip.physics.simulation import compute_grip, simulated_response
+from biogrip.physics.simulation import compute_grip
 from biogrip_study.config.study import Case, Study
 from biogrip_study.gripper.nonlinear import jaw_force
 from biogrip_study.records.identifications import read_batch, share_with_limits
 from biogrip_study.stages.job import job_study, logged, paths
+from biogrip_study.stages.targets import noise_of_readings
 from biogrip_study.tables.layout import Column, Row, ShownTable, titled, write
+from biogrip_study.tables.study import bounds_at_truth
 
 if TYPE_CHECKING:
     snakemake: Any
@@ -79,9 +79,7 @@ def _pairs(study: Study, identifications: list[Path]) -> list[tuple[Case, pd.Dat
 
 def _noise_rad(case: Case) -> float:
     """Return the standard deviation of a reading's noise."""
-    device = case.gripper, case.network, case.torque
-    target = simulated_response(*device, case.times_s)[0]
-    return float(np.mean(standard_deviation(target, case.noise)))
+    return float(np.mean(noise_of_readings(case, case.times_s)))
 
 
 def _rows(case: Case, found: pd.DataFrame, density: float, papers: float) -> Iterator[Row]:
@@ -91,8 +89,7 @@ def _rows(case: Case, found: pd.DataFrame, density: float, papers: float) -> Ite
     """
     grip = compute_grip(case.gripper, case.network, case.torque)
     searched = case.experiment.searched.parameters
-    bounds = bounds_percent(case.experiment, case.noise, case.parameters, case.times_s)
-    for quantity, bound in bounds:
+    for quantity, bound in bounds_at_truth(case):
         if not bound < DETERMINED_PERCENT:
             continue
         members = [searched[index] for index in quantity.members]
@@ -117,6 +114,9 @@ def _rows(case: Case, found: pd.DataFrame, density: float, papers: float) -> Ite
         }
 
 
+_DASHES = ":", "-", "--", "-."
+
+
 def draw_protocols(study: Study, identifications: list[Path]) -> Figure:
     """Draw jaw forces, and how the identified k of all seeds lies about the truth."""
     pairs = _pairs(study, identifications)
@@ -129,8 +129,8 @@ def draw_protocols(study: Study, identifications: list[Path]) -> Figure:
         estimates.axvspan(1 - _ENOUGH / 100, 1 + _ENOUGH / 100, color=SHADE)
         mine = [(case, found) for case, found in pairs if case.parameters == paper.parameters]
         for number, (case, found) in enumerate(mine):
-            color, dashes = (ORANGE, "-") if case is paper else (BLUE, ("-", "--")[number - 1])
-            label = "the paper's" if case is paper else ("jaws press", "less noise")[number - 1]
+            label = case.title.removeprefix(paper.title).lstrip(", ") or "the paper's"
+            color, dashes = (BLUE, _DASHES[number % len(_DASHES)]) if number else (ORANGE, "-")
             if number < 2:
                 forces.plot(*_force(case), color=color, label=label)
             ratios = found["k_N_per_m"].to_numpy(float) / case.parameters["k"]

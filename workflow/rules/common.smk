@@ -110,18 +110,11 @@ def names(cases):
     return "|".join(cases) or "(?!)"
 
 
-def trades(case):
-    """True if two exchangeable parameters are searched, and others besides."""
-    pair = {*case.sample.model.exchangeable}
-    return len(pair) == 2 and pair < {parameter.name for parameter in case.block.searched}
-
-
 # Cases that have what only some have, those of sweeps' points among them.
 SIMULATED = [*STUDY.simulated, *STUDY.points]
 EVERY = [*STUDY.cases, *STUDY.points]
 CALIBRATED = [n for n in EVERY if STUDY.case(n).block.assumed_gripper == "calibrated"]
 SELECTING = list(STUDY.cases) if STUDY.config.model_selection.models else []
-ANSWERED = [name for name in STUDY.gripped if trades(STUDY.case(name))][-1:]
 calibration_of = of_case("results/calibrations/{case}.yaml", CALIBRATED)
 
 # Tables and figures of the study, of what there is in it, and those of a case.
@@ -147,8 +140,7 @@ OTHERS = [
 OTHER_TABLES += ["protocols"] * bool(OTHERS)
 GRIPPER_FIGURES = ["comb", "linkage", "torque"] if HAS_GRIPPER else []
 PAPER_FIGURES = ["protocols"] * bool(OTHERS) + ["referee"] * (len(STUDY.config.readings) > 1)
-FIGURES = ["answer"] if ANSWERED else []
-FIGURES += ["moduli", "overview"] if STUDY.simulated else []
+FIGURES = ["overview"] if STUDY.simulated else []
 # Those of a case, with the functions that draw them, and the first cases, as many as a page shows.
 OF_EVERY_CASE = {
     "convergence": "biogrip_study.figures.course.draw_convergence",
@@ -158,8 +150,6 @@ OF_EVERY_CASE = {
     "profiles": "biogrip_study.figures.case_fit.draw_profiles",
 }
 OF_SIMULATED = {
-    "force": "biogrip_study.figures.case_fit.draw_force",
-    "scatter": "biogrip_study.figures.course.draw_scatter",
     "waterfall": "biogrip_study.figures.course.draw_waterfall",
 }
 FIRST = STUDY.of(STUDY.simulated[:3])

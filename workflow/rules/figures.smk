@@ -9,7 +9,6 @@ rule case_figures:
         measurements=of_case("results/measurements/{case}/{batch}.npz"),
         verdicts="results/identifiability/{case}.json",
         expected=of_case("results/identifiability/expected/{case}.json", STUDY.simulated),
-        target=of_case("results/targets/{case}.csv", STUDY.simulated),
         calibrated=calibration_of,
     output:
         **{name: drawing(name, "{case}") for name in [*OF_EVERY_CASE, *OF_SIMULATED]},
@@ -21,8 +20,8 @@ rule case_figures:
         case=names(STUDY.simulated),
     params:
         **settings_of(
-            *"actuator methods seeds evaluation title published contact models".split(),
-            *("genetic_algorithm", "identifiability.confidence", *FIT, *SAMPLING, NOISE),
+            *"actuator methods seeds evaluation title published".split(),
+            *("genetic_algorithm", *FIT, *SAMPLING),
         ),
         stages=[*OF_EVERY_CASE.values(), *OF_SIMULATED.values()],
     message:
@@ -56,46 +55,6 @@ rule summary:
         "Summing up what the judged trace of {wildcards.case} tells"
     script:
         "../scripts/stage.py"
-
-
-rule answer:
-    input:
-        verdicts=files("results/identifiability/{case}.json", ANSWERED),
-        measurements=first_traces(ANSWERED),
-        calibrated=files(
-            "results/calibrations/{case}.yaml", [name for name in ANSWERED if name in CALIBRATED]
-        ),
-    output:
-        answer=drawing("answer"),
-    log:
-        "results/logs/answer.log",
-    params:
-        **settings_of("actuator", *keys_of_cases(STUDY.of(ANSWERED), *FIT)),
-        stages=["biogrip_study.figures.overview.draw_answer"],
-    message:
-        "Drawing what a trace tells"
-    script:
-        "../scripts/figures.py"
-
-
-rule moduli:
-    input:
-        identifications=files("results/identifications/{case}.csv", FIRST.cases),
-        targets=files("results/targets/{case}.csv", FIRST.cases),
-    output:
-        moduli=drawing("moduli"),
-    log:
-        "results/logs/moduli.log",
-    params:
-        **settings_of(
-            *("methods", "seeds", "evaluation", "actuator"),
-            *keys_of_cases(FIRST, *FIT, "title", *SAMPLING, NOISE),
-        ),
-        stages=["biogrip_study.figures.overview.draw_moduli"],
-    message:
-        "Drawing the moduli of the fits"
-    script:
-        "../scripts/figures.py"
 
 
 rule overview:
@@ -149,6 +108,7 @@ rule page:
             *(key for key in STUDY_KEYS if key != "cases"),
             *keys_of_cases(STUDY, *CASE_KEYS),
         ),
+        shown=SHOWN,
         stages=["biogrip_study.page.page.write_report"],
     message:
         "Writing the page of the study"

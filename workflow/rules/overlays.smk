@@ -17,7 +17,6 @@ rule sweep:
             [name for name in points(wildcards.sweep) if name in CALIBRATED],
         ),
     output:
-        points="results/robustness/{sweep}.csv",
         table="results/tables/robustness_{sweep}.csv",
         page=page_of_table("robustness", "{sweep}"),
     log:
@@ -30,10 +29,7 @@ rule sweep:
             # All, for points are cases with some keys changed.
             *keys_of_cases(STUDY, *CASE_KEYS),
         ),
-        stages=[
-            "biogrip_study.tables.sweeps.judge_points",
-            "biogrip_study.tables.sweeps.robustness",
-        ],
+        stages=["biogrip_study.tables.sweeps.robustness"],
     message:
         "Judging the sweep {wildcards.sweep}"
     script:

@@ -109,7 +109,6 @@ rule models:
 
 rule coverage:
     input:
-        targets=files("results/targets/{case}.csv", STUDY.covered),
         intervals=files("results/coverage/{case}/{batch}.csv", STUDY.covered),
         calibrated=files(
             "results/calibrations/{case}.yaml",
@@ -124,6 +123,7 @@ rule coverage:
         **settings_of(
             "actuator",
             *keys_of_cases(STUDY.of(STUDY.covered), *FIT, *SAMPLING, NOISE, "identifiability"),
+            *keys_of_cases(STUDY.of(STUDY.covered), "contact", "models"),
         ),
         stages=["biogrip_study.tables.study.coverage"],
     message:

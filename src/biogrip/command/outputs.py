@@ -13,10 +13,9 @@ from biogrip import __version__
 from biogrip.command.words import set_up_in_words
 from biogrip.digits import rounded_numbers, with_unit
 from biogrip.errors import BiogripError
-from biogrip.files import scratch_path, write_text
+from biogrip.files import AGAIN, read_object, scratch_path, whole, write_object, write_text
 from biogrip.judging.without_model import EXPONENT, LEVEL
 from biogrip.physics.instruments import INSTRUMENTS, ROTATION, Channel
-from biogrip.records import AGAIN, read_object, whole, write_object
 from biogrip.terminal import visible, visible_lines
 
 WRITTEN_BY = "written_by_biogrip"

@@ -21,7 +21,7 @@ import biogrip.levels as levels
 from biogrip.arrays import Array
 from biogrip.digits import plain
 from biogrip.fit.experiment import Experiment
-from biogrip.fit.least_squares import fit_from
+from biogrip.fit.least_squares import fit_from, refit
 from biogrip.fit.nested_fits import FittedModels
 from biogrip.fit.problem import Fit, TraceProblem
 from biogrip.fit.trace_fit import TraceFit
@@ -201,7 +201,7 @@ def lower_fit(judged: Diagnosis, fit: Fit) -> Fit | None:
     exact = levels.EXACT * judged.likelihood.problem.residuals.peak
     if judged.lowest is None or fit.misfit < exact:
         return None
-    missed = fit.at(fit_from([judged.likelihood.problem], judged.lowest))
+    missed = refit(fit, judged.likelihood.problem, judged.lowest)
     return None if judged.likelihood.increase(missed.misfit) > -levels.MISSED else missed
 
 

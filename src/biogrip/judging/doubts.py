@@ -27,7 +27,8 @@ import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray
 from biogrip.digits import counted, p_value, plain, with_limits
 from biogrip.fit.any_sample import fit_any_sample
-from biogrip.fit.noise_model_fit import (
+from biogrip.fit.trace_noise import (
+    NoiseModel,
     absorbed,
     compare_extremes,
     compute_growth,
@@ -35,7 +36,7 @@ from biogrip.fit.noise_model_fit import (
 )
 from biogrip.judging import whiteness
 from biogrip.judging.likelihood import Likelihood
-from biogrip.physics.noise import ROOT_12, NoiseModel, estimate_noise, without
+from biogrip.physics.noise import ROOT_12, estimate_noise, without
 from biogrip.physics.protocol import Course, superposed
 from biogrip.physics.residuals import Residuals
 

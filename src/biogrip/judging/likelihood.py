@@ -32,7 +32,6 @@ from biogrip.arrays import Array, BoolArray
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.problem import TraceProblem
 from biogrip.physics.modes import linear_responses
-from biogrip.physics.noise import Noise, standard_deviation
 from biogrip.physics.sample_model import SampleModel
 
 # Slopes of hinges: a relaxation time of twice the experiment increases chi^2 by some 50, and one
@@ -417,22 +416,21 @@ def least_sd(
 
 
 def bounds_percent(
-    problem: Experiment, noise: Noise, parameters: Mapping[str, float], time_s: Array
+    problem: Experiment, noise_sd: Array, parameters: Mapping[str, float], time_s: Array
 ) -> list[tuple[Quantity, float]]:
-    """Compute the Cramér-Rao bounds of all identified quantities of a case with its noise.
+    """Compute the Cramér-Rao bounds of all quantities that an experiment identifies.
 
     They are 100 times the standard deviation of a quantity's logarithm, NaN without noise, at
-    parameters in SI units and sampling times, (n_samples,); a parameter of zero is undetermined.
+    parameters in SI units. That of the noise, and sampling times, are (n_samples,); a parameter of
+    zero is undetermined.
     """
     model = problem.searched
     quantities = parameters_and_sum(model)
-    if noise.absent:
+    if not np.any(noise_sd):
         return [(q, math.nan) for q in quantities]
     values = np.array([parameters[name] for name in model.names])
-    rotation, *sensitivity = linear_responses(
-        problem.gripper, model, problem.torque, time_s, values[None]
-    )[0]
-    sigma = standard_deviation(rotation, noise)
+    given = problem.gripper, model, problem.torque, time_s, values[None]
+    sensitivity = linear_responses(*given)[0, 1:]
     with np.errstate(divide="ignore"):
         logarithms = np.log(values)
-    return [(q, 100 * least_sd(np.array(sensitivity), sigma, logarithms, q)) for q in quantities]
+    return [(q, 100 * least_sd(sensitivity, noise_sd, logarithms, q)) for q in quantities]

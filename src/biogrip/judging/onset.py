@@ -28,8 +28,8 @@ from biogrip.digits import instant, plain
 from biogrip.fit.any_sample import fit_any_sample, fit_responses, spread_lags
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import LeastSquaresSettings, fit_from, identify_many
-from biogrip.fit.noise_model_fit import absorbed
 from biogrip.fit.problem import TraceProblem, silent
+from biogrip.fit.trace_noise import absorbed
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.judging.doubts import DOUBT, HARMLESS, MANY, REJECTED, REJECTION, RING, Note
 from biogrip.judging.likelihood import Likelihood, compute_fall, make_likelihood

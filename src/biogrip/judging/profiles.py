@@ -38,8 +38,7 @@ import numpy as np
 import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.digits import plain, with_limits, within_limits
-from biogrip.fit.least_squares import FAIR, FINE, LocalFits, alike
-from biogrip.fit.levenberg_marquardt import Minima, Normal
+from biogrip.fit.least_squares import FAIR, FINE, LocalFits, Minima, Normal, alike
 from biogrip.judging.likelihood import Likelihood, Quantity, find_combinations
 
 DETERMINED = "determined"

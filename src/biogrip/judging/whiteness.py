@@ -35,7 +35,7 @@ from scipy.special import betainc, betaincc, fdtrc, ndtr, ndtri, pdtrc, stdtr
 import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.digits import plain
-from biogrip.fit.noise_model_fit import absorbed
+from biogrip.fit.trace_noise import absorbed
 from biogrip.physics.noise import without
 from biogrip.physics.protocol import is_storage
 from biogrip.physics.residuals import Residuals

@@ -1,4 +1,4 @@
-"""Figures 9, 11 and 12: target, noisy trace, fits, and the residuals; and the force of the jaws."""
+"""Figures 9, 11 and 12: target, noisy trace, fits, and the residuals; and profiles."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -11,14 +11,12 @@ from matplotlib.figure import Figure
 
 from biogrip.arrays import Array
 from biogrip.figures import style
-from biogrip.figures.fit import FittedTrace, draw_fit, fit_of, scale_of
+from biogrip.figures.fit import FittedTrace, draw_fit, fit_of
 from biogrip.figures.likelihood import draw_profiles_of
 from biogrip_study.config.study import Case
-from biogrip_study.gripper.nonlinear import jaw_force
-from biogrip_study.gripper.unilateral import unilateral_response
 from biogrip_study.records.identifications import ALL, basins, read_identifications, read_verdicts
 from biogrip_study.records.rows import seeds_of
-from biogrip_study.records.traces import read_measurements, read_target
+from biogrip_study.records.traces import read_measurements
 from biogrip_study.stages.identification import experiment_for
 from biogrip_study.stages.judgement import JUDGED_SEED
 
@@ -113,36 +111,3 @@ def judged_fit(case: Case, verdicts: Mapping[str, Any], measurements: Path) -> F
     """Return the judged trace of a case and its best fit."""
     values = {item["quantity"]: item["value"] for item in verdicts["quantities"]}
     return _fit_of_seed(case, JUDGED_SEED, values, measurements)
-
-
-def draw_force(case: Case, target: Path) -> Figure:
-    """Draw the jaw force under bilateral contact, and the rotation with and without adhesion."""
-    time_s, _, rotation = read_target(target, case.times_s)
-    device = case.gripper, case.network, case.torque
-    # Without inertia, since the jaws ring for less than a sampling interval after a step.
-    sticking = jaw_force(*device, time_s, nonlinear=case.nonlinear_target, inertia=False)[0]
-    drawn = style.figure(style.COLUMN_IN, 3.4)
-    forces, rotations = drawn.subplots(2, 1, sharex=True, height_ratios=[1.25, 1])
-    factor, unit = scale_of(sticking, "N")
-    forces.axhline(0, color=style.BLACK, linewidth=0.6)
-    forces.plot(time_s, factor * sticking, color=style.BLUE, label="jaws that hold the sample")
-    forces.set(ylabel=f"jaw force ({unit})", title=case.title)
-    turn_factor, turn_unit = scale_of(rotation, "rad")
-    name = "target" + (", jaws that let go" if case.block.contact == "unilateral" else "")
-    rotations.plot(time_s, turn_factor * rotation, color=style.BLACK, label=name)
-    rotations.set(ylabel=f"rotation ({turn_unit})", xlabel="time (s)")
-    rotations.set_xlim(time_s[0], time_s[-1])
-    if bool(sticking.min() < -1e-9 * np.abs(sticking).max()):
-        shaded = {"color": style.ORANGE, "alpha": 0.35, "linewidth": 0, "hatch": "////"}
-        pulling = factor * np.minimum(sticking, 0)
-        forces.fill_between(time_s, pulling, 0, label="the jaws would have to pull", **shaded)
-        if not case.nonlinear_target:
-            apart = unilateral_response(*device, time_s)
-            lost = time_s >= apart.changes_s[0]
-            look = {"linestyle": "--", "color": style.ORANGE, "label": "jaws that let go"}
-            forces.plot(time_s[lost], factor * apart.jaw_force_N[lost], **look)
-            if case.block.contact != "unilateral":
-                rotations.plot(time_s[lost], turn_factor * apart.rotation[0][lost], **look)
-    forces.legend()
-    rotations.legend()
-    return drawn

@@ -1,9 +1,7 @@
-"""Runs of the methods: Figures 8 and 10 over generations, where all runs end, and their errors."""
+"""Runs of the methods: Figures 8 and 10 over generations, and where all runs end."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from statistics import NormalDist
-from string import ascii_letters
 from typing import Any
 
 import numpy as np
@@ -12,15 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import biogrip_study.records.identifications as records
-from biogrip.arrays import Array
 from biogrip.digits import with_unit
 from biogrip.figures import style
-from biogrip.judging.likelihood import parameters_and_sum, quantity_value
-from biogrip.judging.profiles import DETERMINED
 from biogrip_study.config.study import Case
-from biogrip_study.figures.case_fit import SHOWN_SEEDS, draw_runs, first_of_basins, seeds_in_words
+from biogrip_study.figures.case_fit import SHOWN_SEEDS, first_of_basins, seeds_in_words
 from biogrip_study.methods.registry import METHODS
-from biogrip_study.tables.study import bounds_at_truth
 
 # Of increases of chi-squared, smaller ones being drawn there.
 _LOWEST = 1e-3
@@ -139,81 +133,3 @@ def draw_waterfall(case: Case, identifications: Path) -> Figure:
     axes.set_title(f"{case.title}: best encodable point reached")
     drawn.legend(loc="outside lower left")
     return drawn
-
-
-# Bounds on both sides of 1 that an axis shows, more where quartiles are further off; where that
-# leaves no room above zero, it shows decades.
-_WIDTHS, _LOOSE, _MOST_DECADES = 8.0, 0.95, 4
-_PAPER: dict[str, Any] = {"color": style.PAPER, "linestyle": (0, (4, 2))}
-
-
-def draw_scatter(case: Case, identifications: Path, target: Path, expected: Path) -> Figure:
-    """Draw identified over target for every quantity and method."""
-    verdicts = {
-        item["quantity"]: item["verdict"] for item in records.read_verdicts(expected)["quantities"]
-    }
-    identified = records.read_identifications(identifications, case)
-    values = records.values_by_quantity(identified, case.experiment.searched)
-    printed = case.published.identified
-    bounds = bounds_at_truth(case, target)
-    drawn, grid = style.row_of_panels(len(bounds), 3.1)
-    quantities = parameters_and_sum(case.experiment.searched)
-    for index, (axes, quantity) in enumerate(zip(grid, quantities, strict=True)):
-        limit = bounds[quantity.label]
-        true = quantity_value(quantity.label, case.parameters)
-        if not true:
-            axes.axis("off")
-            continue
-        verdict = verdicts[quantity.label]
-        # The bound is a tangent at the truth: no use if the quantity is not determined, or if it
-        # is zero.
-        known = limit if limit and verdict == DETERMINED else np.inf
-        ratios = (values[quantity.label] / true).groupby(identified["method"], sort=False)
-        _draw_ratios(axes, case, {str(name): of.to_numpy(float) for name, of in ratios}, known)
-        if (paper := quantity_value(quantity.label, printed)) is not None:
-            axes.axhline(np.clip(paper / true, *axes.get_ylim()), **_PAPER)
-        said = f"{100 * known:.2g} %" if np.isfinite(known) else verdict.split(" above")[0]
-        style.panel(axes, ascii_letters[index], f"{quantity.symbol}: {said}", 60)
-    grid[0].set_ylabel("identified / target")
-    _legend(drawn, case, identified["seed"].nunique())
-    return drawn
-
-
-def _draw_ratios(axes: Axes, case: Case, of_methods: Mapping[str, Array], limit: float) -> None:
-    """Draw one column of points per method, with points beyond the axis at its edge."""
-    quartiles = np.percentile([*of_methods.values()], [25, 50, 75], axis=1).T
-    reach = max(_WIDTHS * limit, 1.1 * float(np.max(np.abs(quartiles - 1))))
-    loose = reach > _LOOSE
-    ends = np.log10(np.maximum(quartiles, 10.0**-_MOST_DECADES))
-    decades = float(np.clip(np.ceil(np.max(np.abs(ends))), 1, _MOST_DECADES))
-    bottom, top = (10**-decades, 10**decades) if loose else (1 - reach, 1 + reach)
-    for place, (name, ratios) in enumerate(of_methods.items()):
-        color = style.COLORS[METHODS[name].color]
-        draw_runs(axes, place, ratios[:SHOWN_SEEDS], (bottom, top), color)
-        low, middle, high = np.clip(quartiles[place], bottom, top)
-        axes.plot([place, place], [low, high], color=style.TARGET, linewidth=1.0)
-        axes.plot([place - 0.3, place + 0.3], [middle, middle], color=style.TARGET, linewidth=1.4)
-    if np.isfinite(limit):
-        half = NormalDist().inv_cdf((1 + case.confidence) / 2) * limit
-        # Of the logarithm, straight where the axis is.
-        low, high = (np.exp(-half), np.exp(half)) if loose else (1 - half, 1 + half)
-        axes.axhspan(low, high, color=style.SHADE, zorder=0, linewidth=0)
-    axes.axhline(1, color=style.TARGET, linewidth=0.6)
-    if loose:
-        axes.set_yscale("log")
-    axes.set(ylim=(bottom, top), xlim=(-0.6, len(of_methods) - 0.4), xticks=[])
-
-
-def _legend(drawn: Figure, case: Case, seeds: int) -> None:
-    axes = drawn.axes[0]
-    methods = [METHODS[name] for name in case.study.config.methods]
-    marks = [(method.title, "o", style.COLORS[method.color]) for method in methods]
-    for label, marker, color in [*marks, ("beyond the axis", "^", style.TARGET)]:
-        axes.plot([], [], marker, color=color, markersize=4, markeredgewidth=0, label=label)
-    label = f"{100 * case.confidence:g} % by the Cramér-Rao bound (named above), rest known"
-    axes.fill([], [], color=style.SHADE, label=label)
-    if case.published.identified:
-        axes.plot([], [], label="paper", **_PAPER)
-    drawn.legend(*axes.get_legend_handles_labels(), loc="outside lower left", ncols=3)
-    few = "" if seeds <= SHOWN_SEEDS else f": {seeds_in_words(seeds)}, quartiles of all"
-    drawn.suptitle(case.title + few, x=0.01, ha="left", fontsize=8)

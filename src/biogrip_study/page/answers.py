@@ -1,15 +1,9 @@
 """The study's answers in sentences and in one table, written from rows of its tables."""
 
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
 
 from biogrip.digits import legible, plain, with_unit
-from biogrip.fit.nested_fits import FittedModel, advice, fits_far_better, preferred
-from biogrip.judging.doubts import DOUBTFUL, OK, REJECTED
-from biogrip.judging.profiles import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
-from biogrip.physics.models import CANDIDATES
-from biogrip_study.records.identifications import ALL
 
 TableRow = Mapping[str, str]
 
@@ -29,69 +23,6 @@ def say_what_the_study_gives(
     shares[0] = shares[0].replace("(", f"of {rows[0]['seeds']} runs (95 % interval: ", 1)
     fit = f"finds the best fit that its digits can express (χ² within {tolerance:g})"
     return f"{who} {shown} {fit}, in {_enumerated(shares)}."
-
-
-def say_what_recordings_tell(judged: Sequence[Mapping[str, Any]]) -> str:
-    """Say what a recorded trace determines, or in how many of several each quantity is determined.
-
-    Each is what a file of verdicts has; "" if there are none.
-    """
-    if not judged:
-        return ""
-    every = [quantity for verdicts in judged for quantity in verdicts["quantities"]]
-    fits = Counter(verdicts["fit"] for verdicts in judged)
-    if len(judged) > 1:
-        counts = Counter(q["quantity"] for q in every if q["verdict"] == DETERMINED)
-        shares = [
-            f"{name} is determined in {counts[name]}"
-            for name in dict.fromkeys(q["quantity"] for q in every)
-        ]
-        told = f"Of {len(judged)} traces, {_enumerated(shares)}."
-    elif fits[REJECTED]:
-        told = "The model cannot give this trace, so that the trace determines nothing."
-    else:
-        named = defaultdict[str, list[str]](list)
-        for q in every:
-            provided = f" (provided {q['provided']})" if q["provided"] else ""
-            named[q["verdict"]].append(q["quantity"] + provided)
-        said = [
-            f"{words} {_enumerated(named[verdict])}"
-            for verdict, words in _VERBS.items()
-            if named[verdict]
-        ]
-        told = f"This trace {'; it '.join(said)}."
-    unsure = [f"{fits[fit]} {fit}" for fit in (DOUBTFUL, REJECTED) if fits[fit]]
-    return told + (f" Of the fits, {_enumerated(unsure)}." if unsure else "")
-
-
-def say_which_model_is_better(
-    models: Iterable[TableRow], case: str, candidate: str, fit: str = OK
-) -> str:
-    """Say which model BIC prefers in a case's trace to its own, one of `CANDIDATES`; "" if none.
-
-    Rows are those of the table of models, where the model that made simulated traces has a longer
-    title: none is better. None is simpler and as good if the own fit is rejected.
-    """
-    names = {sample.model.title: name for name, sample in CANDIDATES.items()}
-    tried = [
-        FittedModel(
-            names[row["model"]], *(float(row[f"median_delta_{name}"]) for name in _CRITERIA)
-        )
-        for row in models
-        if row["case"] == case and row["model"] in names
-    ]
-    judge = fits_far_better if fit == REJECTED else preferred
-    known = any(model.candidate == candidate for model in tried)
-    return advice(tried, candidate) if known and judge(tried, candidate) else ""
-
-
-_CRITERIA = "aic", "bic"
-_VERBS = {
-    DETERMINED: "determines",
-    BOUNDED_BELOW: "bounds from below only",
-    BOUNDED_ABOVE: "bounds from above only",
-    NOT_DETERMINED: "tells nothing of",
-}
 
 
 def rows_of_determined(
@@ -172,42 +103,10 @@ def rows_beside_the_paper(
     ]
 
 
-def compared_rows(
-    errors: Iterable[TableRow], verdicts: Iterable[TableRow], titles: Mapping[str, str]
-) -> list[dict[str, str]]:
-    """Return targets beside the study's results, with the median error of a run in brackets.
-
-    Quantities that no case determines are left out, and medians between quartiles a decade apart:
-    runs in two humps have none near their median. Rows are those of the tables of errors and
-    verdicts, titles those of the cases.
-    """
-    decided = {row["quantity"] for row in verdicts if row["verdict"] == DETERMINED}
-    return [
-        {
-            "sample": titles[row["case"]],
-            "quantity": legible(with_unit(row["parameter"], row["unit"])),
-            "target": _legible_number(row["target"]),
-            "this study: median": _median(row),
-            "quartiles": _ends(row, "p25_identified", "p75_identified"),
-        }
-        for row in errors
-        if row["parameter"] in decided and row["basin"] == ALL and row["target"]
-    ]
-
-
 def _ends(row: TableRow, low: str, high: str, unit: str = "", digits: int = 4) -> str:
     return legible(
         f"{_legible_number(row[low], digits)} to {_legible_number(row[high], digits)}{unit}"
     )
-
-
-def _median(row: TableRow) -> str:
-    low, high = float(row["p25_identified"]), float(row["p75_identified"])
-    if high > 10 * low:
-        return "spread over decades"
-    error = row["median_absolute_error_percent"]
-    said = f" ({plain(float(f'{float(error):.2g}'))} %)" if error else ""
-    return _legible_number(row["median_identified"]) + legible(said)
 
 
 def share_of(row: TableRow) -> str:

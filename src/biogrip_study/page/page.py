@@ -16,12 +16,11 @@ from biogrip import __version__
 from biogrip.digits import legible, significant, with_unit
 from biogrip.errors import BiogripError
 from biogrip.figures.fit import scale_of
-from biogrip.files import write_text
+from biogrip.files import read_table, whole, write_text
 from biogrip.judging.likelihood import PROVIDED, quantity_value
 from biogrip.judging.what_moves import error_in_words
 from biogrip.page.templates import data_url, environment
 from biogrip.physics.noise import rms
-from biogrip.records import read_table, whole
 from biogrip_study.config.study import Case, Study
 from biogrip_study.page import answers
 from biogrip_study.records.identifications import read_verdicts, share_with_limits
@@ -31,11 +30,8 @@ from biogrip_study.stages.judgement import JUDGED_SEED
 # Characters left for images in a report of at most 8 MB.
 _MOST_PICTURE_LETTERS = 2_800_000
 _LIBRARIES = ("numpy", "scipy", "pandas", "matplotlib", "snakemake")
-# Tables, or beginnings of their names, that answers are written from.
-_ANSWERING = (
-    *("errors.csv", "verdicts_", "coverage.csv"),
-    *("methods.csv", "tables_5_to_7.csv", "models.csv"),
-)
+# Tables that answers are written from.
+_ANSWERING = "coverage", "methods", "tables_5_to_7"
 # Tables under what is reconstructed; the others are under their heading.
 _EVIDENCE = ("gripper", "gene_ranges", "evidence", "printed_values")
 # What only the paper's page shows of the gripper and the default search ranges.
@@ -48,7 +44,8 @@ _UNFOLDED = "judged_fit", "profiles"
 _QUESTION = "How well can a MEMS microgripper identify the viscoelastic parameters of a cell?"
 _MOST_TITLES = 3
 # The paper's figure of its first fit, between those of its convergence and of its evolution.
-_FIRST_FIT = 9
+_FIRST_FIT = {"convergence": -1, "fit": 0, "evolution": 1}
+_FIGURE_OF_FIRST_FIT = 9
 # Parameters that have a slider.
 _SLID = "k", "k_p", "c", "c_p"
 # As many readings as a curve of a few hundred pixels shows.
@@ -75,7 +72,7 @@ class Entry:
     title: str
     caption: str
     file: Path
-    content: str | None = None
+    content: str | None
     """Table element, or data URL of an image; None if there is no room for it."""
     size: tuple[int, int] = (0, 0)
     """Width and height of an image, px."""
@@ -85,6 +82,7 @@ class Entry:
 
 def write_report(
     study: Study,
+    shown: Mapping[str, Sequence[tuple[str, str]]],
     captions: list[Path],
     figures: list[Path],
     tables: list[Path],
@@ -97,8 +95,8 @@ def write_report(
     """Write the report of a study as HTML, and its answers alone.
 
     Captions are text, named like what they are of; figures are PNG, tables HTML, downloads the same
-    tables as CSV. Verdicts and measurements with the judged trace are those of all cases in their
-    order.
+    tables as CSV. What these show, and the case or sweep that they are of, is told in their order.
+    Verdicts and measurements with the judged trace are those of all cases in their order.
     """
     texts = {
         (path.parent.name, path.stem): " ".join(path.read_text(encoding="utf-8").split())
@@ -107,59 +105,55 @@ def write_report(
     titles = {case.name: case.title for case in study.cases.values()}
     owners = titles | {name: sweep.title or name for name, sweep in study.config.sweeps.items()}
     judged = [*zip(study.cases.values(), map(read_verdicts, verdicts), strict=True)]
+
+    def entry(kind: str, item: tuple[str, str], file: Path, **of_file: Any) -> Entry:
+        name, whose = item
+        title = name.replace("_", " ").capitalize() + (f": {owners[whose]}" if whose else "")
+        return Entry(name, whose, title, legible(texts[kind, name]), file, **of_file)
+
+    images = zip(shown["figures"], figures, _images(figures), strict=True)
     drawn = [
-        replace(entry_of(path, owners, texts), content=image, size=size)
-        for path, (image, size) in zip(figures, _images(figures), strict=True)
+        entry("figures", item, picture, content=url, size=size)
+        for item, picture, (url, size) in images
     ]
+    files = zip(shown["tables"], tables, downloads, strict=True)
     listed = [
-        replace(
-            entry_of(path, owners, texts),
-            content=_table(path, titles),
+        entry(
+            "tables",
+            item,
+            table,
+            content=_table(table, titles),
             download=data_url("text/csv", whole(csv).encode()),
         )
-        for path, csv in zip(tables, downloads, strict=True)
+        for item, table, csv in files
     ]
-    shown = {
+    several = f"{len(titles)} samples"
+    context = {
         "sliders": _sliders(study, measurements),
-        **_answered(study, judged, downloads),
+        **_answered(study, downloads),
         "cases": judged,
-        **_placed(study, drawn, owners),
-        **_tables_placed(study, listed),
+        **_placed(study, drawn, listed, owners),
         # But for what changes no result.
         "config": yaml.safe_dump(
             {key: value for key, value in study.plain.items() if key != "pdf"}, allow_unicode=True
         ),
-        "title": _QUESTION if study.published else _named_together([*titles.values()]),
+        "title": ", ".join(titles.values()) if len(titles) <= _MOST_TITLES else several,
         "paper": bool(study.published),
         "versions": {"biogrip": __version__, **{name: version(name) for name in _LIBRARIES}},
     }
+    if study.published:
+        context["title"] = _QUESTION
     for file, template in ((page, "report"), (front, "answers")):
-        write_text(file, TEMPLATES.get_template(f"{template}.html.j2").render(shown))
+        write_text(file, TEMPLATES.get_template(f"{template}.html.j2").render(context))
 
 
-def _named_together(titles: Sequence[str]) -> str:
-    return ", ".join(titles) if len(titles) <= _MOST_TITLES else f"{len(titles)} samples"
-
-
-def _sliders(study: Study, measurements: Sequence[Path]) -> dict[str, Any] | None:
-    """Return what sliders of one of the paper's cases need; None if none can have them."""
-    measured = zip(study.cases.values(), measurements, strict=True)
-    movable = [(case, of) for case, of in measured if study.published and has_sliders(case)]
-    # Where the branch relaxes fastest, its damper and the parallel one are told apart least.
-    movable.sort(key=lambda pair: pair[0].parameters["c"] / pair[0].parameters["k"])
-    return slid(*movable[0]) if movable else None
-
-
-def _answered(
-    study: Study, judged: Sequence[tuple[Case, Mapping[str, Any]]], downloads: Sequence[Path]
-) -> dict[str, Any]:
-    """Return the answers, and results beside the paper's or the truth."""
-    errors, verdicts, coverage, methods, beside, models = (
-        [row for csv in downloads if csv.name.startswith(name) for row in read_table(csv)]
+def _answered(study: Study, downloads: Sequence[Path]) -> dict[str, Any]:
+    """Return the answers, and results beside the paper's."""
+    coverage, methods, beside = (
+        [row for csv in downloads if csv.stem == name for row in read_table(csv)]
         for name in _ANSWERING
     )
     titles = {case.name: case.title for case in study.cases.values()}
-    recorded = [told for case, told in judged if case.recorded and not study.published]
     asked = methods, study.shown_method.title
     who = "Run again, the paper's" if study.published else "The"
     runs = max((int(row["shown_seeds"] or 0) for row in coverage), default=0)
@@ -169,47 +163,57 @@ def _answered(
         "none_at_most": share_with_limits(0, runs)[2] if runs else 1.0,
         "provided": PROVIDED,
         "answers": [
-            answers.say_what_recordings_tell(recorded),
             answers.say_what_the_study_gives(*asked, titles, who, study.optimum_tolerance),
             answers.say_which_method_finds_it(*asked),
         ],
-        "compared": answers.rows_beside_the_paper(beside, titles)
-        or answers.compared_rows(errors, verdicts, titles),
-        "better": {
-            case.name: answers.say_which_model_is_better(
-                models, case.name, case.sample.candidate, told["fit"]
-            )
-            for case, told in judged
-        },
+        "compared": answers.rows_beside_the_paper(beside, titles),
     }
 
 
-def _placed(study: Study, drawn: Sequence[Entry], owners: Mapping[str, str]) -> dict[str, Any]:
-    """Return figures by their place: what a trace tells, the story, and all others, folded."""
+def _placed(
+    study: Study, drawn: Sequence[Entry], listed: Sequence[Entry], owners: Mapping[str, str]
+) -> dict[str, Any]:
+    """Return figures by their place, the story and all others, folded, and tables."""
     if study.published:
-        story = _as_in_paper(drawn, [study.cases[name] for name in study.published])
+        story = _as_in_paper(drawn, study)
     else:
-        drawn = [entry for entry in drawn if _is_own(entry, study)]
+        drawn, listed = (
+            [entry for entry in entries if entry.name not in _OF_THE_PAPER]
+            for entries in (drawn, listed)
+        )
         story = [entry for entry in drawn if entry.name in _UNFOLDED]
-    told = [replace(entry, title="What a trace tells") for entry in drawn if entry.name == "answer"]
-    unfolded = {entry.file for entry in told + story}
+    unfolded = {entry.file for entry in story}
     folded: dict[str, list[Entry]] = {}
     for entry in drawn:
         if entry.file not in unfolded:
             folded.setdefault(owners.get(entry.whose, "The study"), []).append(entry)
-    return {"told": told, "story": story, "folded": folded}
+    once = _each_caption_once(listed)
+    return {
+        "story": story,
+        "folded": folded,
+        "evidence_tables": [entry for entry in once if entry.name in _EVIDENCE],
+        "tables": [entry for entry in once if entry.name not in _EVIDENCE],
+    }
 
 
-def _tables_placed(study: Study, listed: Iterable[Entry]) -> dict[str, list[Entry]]:
-    """Return tables by their place, no caption twice."""
-    places: dict[str, list[Entry]] = {"evidence_tables": [], "tables": []}
-    captions = set[str]()
-    for entry in listed:
-        once = replace(entry, caption="" if entry.caption in captions else entry.caption)
-        captions.add(entry.caption)
-        if study.published or _is_own(entry, study):
-            places["evidence_tables" if entry.name in _EVIDENCE else "tables"].append(once)
-    return places
+def _each_caption_once(entries: Iterable[Entry]) -> list[Entry]:
+    """Return entries of which only the first with a caption has it."""
+    first = {entry.caption: entry for entry in reversed([*entries])}
+    return [
+        entry if entry is first[entry.caption] else replace(entry, caption="") for entry in entries
+    ]
+
+
+def _as_in_paper(figures: Sequence[Entry], study: Study) -> list[Entry]:
+    """Return figures that the paper has, by their numbers there."""
+    numbered = dict[int, Entry]()
+    for entry in figures:
+        number = study.cases[entry.whose].published.figure if entry.whose in study.cases else None
+        beside = _FIRST_FIT.get(entry.name)
+        if number and (beside == 0 or (beside and number == _FIGURE_OF_FIRST_FIT)):
+            number += beside
+            numbered[number] = replace(entry, title=f"Figure {number}. {entry.title}")
+    return _each_caption_once([numbered[number] for number in sorted(numbered)])
 
 
 def write_summary(
@@ -224,44 +228,6 @@ def write_summary(
         ],
     )
     write_text(summary, text)
-
-
-def _is_own(entry: Entry, study: Study) -> bool:
-    """Tell whether a page without the paper shows it: errors are of simulated traces."""
-    of = [study.cases[entry.whose]] if entry.whose in study.cases else study.cases.values()
-    untold = entry.name == "errors" and all(case.recorded for case in of)
-    return entry.name not in _OF_THE_PAPER and not untold
-
-
-def entry_of(file: Path, owners: Mapping[str, str], texts: Mapping[tuple[str, str], str]) -> Entry:
-    """Return the entry of a file that is named after what it shows, and its case or sweep.
-
-    Owners are their titles; captions are by the file's folder and what it shows.
-    """
-    kind, stem = file.parent.name, file.stem
-    # One name may end with another, and that of a figure with that of a case.
-    ends = sorted((name for name in owners if stem.endswith(f"_{name}")), key=len)
-    whose = "" if (kind, stem) in texts or not ends else ends[-1]
-    name = stem.removesuffix(f"_{whose}")
-    title = name.replace("_", " ").capitalize() + (f": {owners[whose]}" if whose else "")
-    return Entry(name, whose, title, legible(texts[kind, name]), file)
-
-
-def _as_in_paper(figures: Sequence[Entry], published: Sequence[Case]) -> list[Entry]:
-    """Return figures that the paper has, by their numbers there, no caption twice."""
-    numbers = {(case.name, "fit"): case.published.figure for case in published}
-    first = published[0].name if published else ""
-    if numbers.get((first, "fit")) == _FIRST_FIT:
-        numbers |= {(first, "convergence"): _FIRST_FIT - 1, (first, "evolution"): _FIRST_FIT + 1}
-    by_number = {numbers.get((entry.whose, entry.name)): entry for entry in figures}
-    return [
-        replace(
-            by_number[n],
-            title=f"Figure {n}. {by_number[n].title}",
-            caption=by_number[n].caption * (by_number[n].whose == first),
-        )
-        for n in sorted(n for n in by_number if n is not None)
-    ]
 
 
 def _images(paths: Sequence[Path]) -> Iterator[tuple[str | None, tuple[int, int]]]:
@@ -292,17 +258,18 @@ def _table(path: Path, titles: Mapping[str, str]) -> str:
     return re.sub("<td>(.*?)</td>", cell, table[0].replace("<th>", '<th scope="col">'))
 
 
-def has_sliders(case: Case) -> bool:
-    """Tell whether a case has the response of the script: one branch, equal arms, only steps."""
-    arms = case.experiment.gripper.left, case.experiment.gripper.right
-    simulated = case.instrument.has_jaws and not case.recorded
-    alone = {*case.parameters} == {*_SLID} and min(case.parameters.values()) > 0
-    return simulated and alone and arms[0] == arms[1] and not case.torque.changes[:, 1:].any()
+def _sliders(study: Study, measurements: Sequence[Path]) -> dict[str, Any] | None:
+    """Return what sliders of one of the paper's cases need; None if none can have them.
 
-
-def slid(case: Case, measurements: Path) -> dict[str, Any]:
-    """Return a case's first trace, thinned, with its parameters, arm and steps, in SI units."""
-    recorded, gripper = read_measurements(measurements, [JUDGED_SEED]), case.experiment.gripper
+    That is its first trace, thinned, with parameters, arm and steps, in SI units.
+    """
+    measured = zip(study.cases.values(), measurements, strict=True)
+    movable = [(case, file) for case, file in measured if study.published and _has_sliders(case)]
+    if not movable:
+        return None
+    # Where the branch relaxes fastest, its damper and the parallel one are told apart least.
+    case, file = min(movable, key=lambda pair: pair[0].parameters["c"] / pair[0].parameters["k"])
+    recorded, gripper = read_measurements(file, [JUDGED_SEED]), case.experiment.gripper
     readings, target = recorded.readings[JUDGED_SEED], recorded.target
     assert target is not None
     factor, unit = scale_of(readings, case.instrument.read.unit)
@@ -328,3 +295,11 @@ def slid(case: Case, measurements: Path) -> dict[str, Any]:
         },
         "steps": [(start, height) for start, _, height in case.torque.jumps],
     }
+
+
+def _has_sliders(case: Case) -> bool:
+    """Tell whether a case has the response of the script: one branch, equal arms, only steps."""
+    arms = case.experiment.gripper.left, case.experiment.gripper.right
+    simulated = case.instrument.has_jaws and not case.recorded
+    alone = {*case.parameters} == {*_SLID} and min(case.parameters.values()) > 0
+    return simulated and alone and arms[0] == arms[1] and not case.torque.changes[:, 1:].any()

@@ -15,10 +15,10 @@ import numpy as np
 
 from biogrip.arrays import Array, BoolArray
 from biogrip.digits import significant
+from biogrip.files import read_object
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.problem import Fit
 from biogrip.physics.sample_model import SINGLE_BRANCH, Parameter, SampleModel
-from biogrip.records import read_object
 from biogrip_study.config.study import Case, Study
 from biogrip_study.records.rows import RowFile, read_arrays, seeds_of
 
@@ -41,14 +41,14 @@ MODEL_FITS = RowFile(
 INTERVALS = RowFile(
     "intervals",
     (
-        *("case", "quantity", "seed", "estimate", "low", "high", "estimate_rest_known"),
+        *("case", "quantity", "seed", "estimate", "low", "high"),
         *("verdict", "shown_low", "shown_high"),
     ),
     words=("case", "quantity", "verdict"),
 )
-"""A row per quantity and seed. Quantities that traces should determine have an estimate, its
-limits, and the estimate with uninformed parameters fixed at their true values. For some seeds, all
-quantities also have the verdict and limits that users are shown, from whole profiles."""
+"""A row per quantity and seed. Quantities that traces should determine have an estimate and its
+limits. For some seeds, all quantities have the verdict and limits that users are shown, from whole
+profiles."""
 
 READING_FILE = RowFile(
     "readings",

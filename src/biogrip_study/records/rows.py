@@ -1,6 +1,6 @@
 """How files between rules are written and read: CSV with a header, and arrays of NumPy.
 
-The rows of a file are all that whoever reads it knows of, see `biogrip.records`.
+The rows of a file are all that whoever reads it knows of, see `biogrip.files`.
 """
 
 import zlib
@@ -16,8 +16,7 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.files import atomic_write
-from biogrip.records import AGAIN, as_it_was, whole, write_rows
+from biogrip.files import AGAIN, as_it_was, atomic_write, whole, write_rows
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -56,8 +55,14 @@ class RowFile:
             ) from error
         if not {*self.columns} <= {*frame.columns}:
             raise BiogripError(f"{path}, line 1: wanted the columns {', '.join(self.columns)}.")
-        if known:
-            require_rows(path, frame, [*known], product(*known.values()))
+        rows = [*frame[[*known]].itertuples(index=False, name=None)]
+        wanted = [*product(*known.values())] if known else rows
+        if len(rows) != len(wanted) or {*rows} != {*wanted}:
+            lacking = [row for row in wanted if row not in {*rows}]
+            text = f", and none of {', '.join(map(str, lacking[0]))}" if lacking else ""
+            raise BiogripError(
+                f"{path}: found {len(rows)} rows, wanted {len(wanted)}{text}. {AGAIN}"
+            )
         return frame
 
 
@@ -65,18 +70,6 @@ def seeds_of(batch: str) -> range:
     """Return the seeds of a batch, whose name has the first and the last, e.g. ``seeds_0-24``."""
     first, last = map(int, batch.removeprefix("seeds_").split("-"))
     return range(first, last + 1)
-
-
-def require_rows(
-    path: Path, frame: "pd.DataFrame", columns: Sequence[str], wanted: Iterable[tuple[Any, ...]]
-) -> None:
-    """Refuse, by a `BiogripError`, a file without each row that is wanted once, or with others."""
-    rows, known = [*frame[[*columns]].itertuples(index=False, name=None)], [*wanted]
-    if len(rows) == len(known) and {*rows} == {*known}:
-        return
-    lacking = [row for row in known if row not in {*rows}]
-    text = f", and none of {', '.join(map(str, lacking[0]))}" if lacking else ""
-    raise BiogripError(f"{path}: found {len(rows)} rows, wanted {len(known)}{text}. {AGAIN}")
 
 
 def write_arrays(path: Path, arrays: Mapping[str, Any]) -> None:

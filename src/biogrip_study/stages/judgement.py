@@ -6,32 +6,29 @@ simulated one the experiment is known, so that neither start, offset, drift nor 
 
 `estimate_intervals` tests the coverage of limits and the spread of fits. Every seed is fitted by
 least squares, and quantities that traces should determine get limits from their profile
-likelihoods. A second estimate has parameters without information fixed at their true values, as the
-Cramér-Rao bound assumes. Some seeds get a full verdict as well, as users are shown it: multiples of
+likelihoods. Some seeds get a full verdict as well, as users are shown it: multiples of
 `verdicts_every`, whatever the batch.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from biogrip.arrays import Array, IntArray
+from biogrip.arrays import Array
 from biogrip.digits import rounded_numbers
-from biogrip.fit.experiment import Experiment
-from biogrip.fit.least_squares import fit_from, identify_from
+from biogrip.files import write_object
+from biogrip.fit.least_squares import identify_from
 from biogrip.fit.trace_fit import TraceFit, fit_least_squares
 from biogrip.identify.data import judged_data
 from biogrip.identify.identify import identify_alike
 from biogrip.judging.diagnosis import Diagnosis, diagnose, profiled, settled
-from biogrip.judging.likelihood import Likelihood, Quantity, covariance, parameters_and_sum
+from biogrip.judging.likelihood import Likelihood, Quantity, parameters_and_sum
 from biogrip.judging.profiles import DETERMINED, Finding, compute_findings
 from biogrip.physics.noise import add_noise, rms, standard_deviation
-from biogrip.physics.sample_model import SampleModel, with_fixed
-from biogrip.records import write_object
 from biogrip.terminal import Progress
 from biogrip_study.config.study import Case
 from biogrip_study.records.identifications import INTERVALS, read_verdicts
@@ -120,7 +117,6 @@ def estimate_intervals(
     determined = {item["quantity"] for item in foreseen if item["verdict"] == DETERMINED}
     every = parameters_and_sum(experiment.searched)
     selected = [quantity for quantity in every if quantity.label in determined]
-    rest_known, informed, truth = _rest_known(case, experiment, time_s, rotation)
     often = case.block.identifiability.verdicts_every
     progress = Progress(f"{case.name}, intervals", len(seeds))
     rows: list[tuple[Any, ...]] = []
@@ -132,10 +128,7 @@ def estimate_intervals(
             [(time_s, trace) for trace in traces],
             [experiment.stream("coverage", seed) for seed in group],
         )
-        known = np.tile(truth, (len(group), 1))
-        if len(informed):
-            simpler = experiment.of_each(time_s, traces, rest_known)
-            known[:, informed] = fit_from(simpler, truth[informed]).x
+        told = {(seed, quantity): [""] * 6 for seed in group for quantity in every}
         for in_full, shown in ((True, every), (False, selected)):
             some = [i for i, seed in enumerate(group) if (seed % often == 0) == in_full]
             if not (some and shown):
@@ -143,27 +136,16 @@ def estimate_intervals(
             judged = judge_quantities([fits[i] for i in some], shown, case.confidence)
             for i, diagnosis in zip(some, judged, strict=True):
                 for quantity, finding in zip(shown, diagnosis.findings, strict=True):
-                    given = (finding, known[i]) if quantity in selected else None
-                    texts = _estimates(quantity, diagnosis.likelihood.best, given)
-                    ends = finding.low, finding.high
-                    limits = ("" if end is None else f"{end:.5g}" for end in ends)
-                    verdict = (finding.verdict, *limits) if in_full else ("", "", "")
-                    rows.append((case.name, quantity.label, group[i], *texts, *verdict))
+                    texts = told[group[i], quantity]
+                    if quantity in selected:
+                        texts[:3] = _estimates(quantity, diagnosis.likelihood.best, finding)
+                    if in_full:
+                        ends = finding.low, finding.high
+                        limits = ("" if end is None else f"{end:.5g}" for end in ends)
+                        texts[3:] = finding.verdict, *limits
+        rows += ((case.name, of.label, seed, *texts) for (seed, of), texts in told.items())
         progress.done(len(group))
-    INTERVALS.write(intervals, sorted(rows, key=lambda row: row[2]))
-
-
-def _rest_known(
-    case: Case, experiment: Experiment, time_s: Array, rotation: Array
-) -> tuple[SampleModel, IntArray, Array]:
-    """Return the model with uninformed parameters fixed, indices of the others, and the truth."""
-    truth = experiment.logs(case.parameters)
-    _, sensitivity = experiment.of(time_s, rotation).residuals(truth)
-    spread = np.diag(covariance(sensitivity, standard_deviation(rotation, case.noise)))
-    informed = np.flatnonzero(np.isfinite(spread))
-    names = experiment.searched.names
-    given = {name: case.parameters[name] for i, name in enumerate(names) if i not in informed}
-    return with_fixed(experiment.searched, given), informed, truth
+    INTERVALS.write(intervals, rows)
 
 
 def judge_quantities(
@@ -195,18 +177,10 @@ def judge_quantities(
     return [diagnosis for diagnosis, _ in judged]
 
 
-def _estimates(
-    quantity: Quantity, best: Array, with_limits: tuple[Finding, Array] | None
-) -> list[str]:
-    """Return estimate, limits and estimate with the rest fixed, as text; the last three if given.
-
-    Given are limits and the log-parameters of the fit with the rest fixed.
-    """
-    logs, digits = [quantity.log(best), None, None, None], _ESTIMATE_DIGITS
-    if with_limits is not None:
-        finding, known = with_limits
-        low, high = finding.log_low, finding.log_high
-        logs[1:] = low, high, quantity.log(known)
-        narrow = low is not None and high is not None and high - low < _NARROW
-        digits = _MORE_DIGITS if narrow else _ESTIMATE_DIGITS
-    return ["" if log is None else f"{math.exp(log):.{digits}g}" for log in logs]
+def _estimates(quantity: Quantity, best: Array, finding: Finding) -> Iterator[str]:
+    """Yield the estimate of a quantity at the best log-parameters, and its limits, as text."""
+    low, high = finding.log_low, finding.log_high
+    narrow = low is not None and high is not None and high - low < _NARROW
+    digits = _MORE_DIGITS if narrow else _ESTIMATE_DIGITS
+    for log in (quantity.log(best), low, high):
+        yield "" if log is None else f"{math.exp(log):.{digits}g}"

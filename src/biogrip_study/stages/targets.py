@@ -14,7 +14,7 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.files import write_text
-from biogrip.physics.noise import Noise, add_noise, stream
+from biogrip.physics.noise import Noise, add_noise, standard_deviation, stream
 from biogrip.physics.protocol import evaluate, sample_times
 from biogrip.physics.simulation import simulated_response
 from biogrip.terminal import warn
@@ -64,6 +64,11 @@ def response(case: Case, time_s: Array) -> tuple[Array, Array | None]:
     if not case.instrument.has_jaws:
         return read, None
     return read, jaw_force(*device, time_s, nonlinear=nonlinear)[0]
+
+
+def noise_of_readings(case: Case, time_s: Array) -> Array:
+    """Return the standard deviation of a case's noise at some times, (n_samples,) both."""
+    return standard_deviation(response(case, time_s)[0], case.noise)
 
 
 def _warn_if_contact_is_lost(case: Case) -> None:

@@ -9,14 +9,13 @@ from scipy.special import betaincinv
 
 import biogrip_study.records.identifications as records
 from biogrip.fit.nested_fits import aic_and_bic
-from biogrip.judging.likelihood import least_sd, parameters_and_sum, quantity_value
+from biogrip.judging.likelihood import Quantity, bounds_percent, parameters_and_sum, quantity_value
 from biogrip.judging.profiles import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
 from biogrip.levels import WIDE
-from biogrip.physics.noise import standard_deviation
 from biogrip_study.config.study import Case, Study
 from biogrip_study.methods.registry import METHODS
-from biogrip_study.records.rows import require_rows, seeds_of
-from biogrip_study.records.traces import read_target
+from biogrip_study.records.rows import seeds_of
+from biogrip_study.stages.targets import noise_of_readings
 from biogrip_study.tables.cases import error_percent
 from biogrip_study.tables.layout import Column, Row, ShownTable, titled
 
@@ -119,7 +118,6 @@ _COVERAGE_COLUMNS = (
     Column("bound_percent", "Cramér-Rao bound, rest known %", 3),
     Column("spread_percent", "Spread %", 3),
     Column("spread_over_bound", "Spread / bound", 3),
-    Column("rest_known_over_bound", "The same, rest known", 3),
     Column("bias_percent", "Bias %", 2),
     Column("confidence_percent", "Confidence %", 4),
     Column("coverage_percent", "Intervals that hold the truth %", 3),
@@ -134,22 +132,21 @@ _COVERAGE_COLUMNS = (
 _COUNTED = {"determined": (DETERMINED,), "one_sided": (BOUNDED_BELOW, BOUNDED_ABOVE)}
 
 
-def coverage(study: Study, targets: list[Path], intervals: list[Path]) -> ShownTable:
-    """Compare estimates and intervals of many seeds with the true values and the bound.
-
-    Targets are files of all cases, in their order.
-    """
+def coverage(study: Study, intervals: list[Path]) -> ShownTable:
+    """Compare estimates and intervals of many seeds with the true values and the bound."""
     rows: list[Row] = []
-    files = zip(study.cases.items(), targets, strict=True)
-    bounds = {name: bounds_at_truth(case, target) for (name, case), target in files}
+    bounds = {
+        (name, quantity.label): percent
+        for name, case in study.cases.items()
+        for quantity, percent in bounds_at_truth(case)
+    }
     for case, head, estimated in _by_quantity(study, intervals):
-        fitted = estimated[estimated["estimate_rest_known"].notna()]
+        fitted = estimated[estimated["estimate"].notna()]
         shown = estimated[estimated["verdict"].notna()]
         if fitted.empty and not np.any(shown["verdict"] != NOT_DETERMINED):
             continue
         truth = head["target"] or 0.0
-        limit = 100 * bounds[case.name][head["quantity"]]
-        of_fits = _spreads(fitted, truth, limit, case.confidence)
+        of_fits = _spreads(fitted, truth, bounds[case.name, head["quantity"]], case.confidence)
         rows.append({**head, "target": truth, **of_fits, **_verdicts_shown(shown, truth)})
     caption = (
         "Least squares over many seeds, for every quantity that a case's traces should determine: "
@@ -157,8 +154,8 @@ def coverage(study: Study, targets: list[Path], intervals: list[Path]) -> ShownT
         "often the intervals hold the truth. The bound is for a simpler problem than that of the "
         "fits: parameters without information in the traces are fixed. Fits search these too; as "
         "they are near zero they can only be overestimated, at the expense of others: hence the "
-        "bias, and a spread above the bound. Rest known: the spread with these parameters at "
-        "their true values. On the right: verdicts from whole profiles, as users are shown them, "
+        "bias, and a spread above the bound. On the right: verdicts from whole profiles, as users "
+        "are shown them, "
         f"in {_judged_seeds(study)}, and how many of them are true; one-sided limits hold more "
         "often than the confidence says."
     )
@@ -178,46 +175,20 @@ def _by_quantity(
             yield case, head | {"target": target}, of_case[of_case["quantity"] == quantity.label]
 
 
-def bounds_at_truth(case: Case, target: Path) -> dict[str, float]:
-    """Return the Cramér-Rao bound of what is searched of a case, at the true parameters.
+def bounds_at_truth(case: Case) -> list[tuple[Quantity, float]]:
+    """Return the `bounds_percent` of what is searched of a case, at its true parameters.
 
-    Parameters
-    ----------
-    case, target
-        The case, and its trace without noise, CSV.
-
-    Returns
-    -------
-    dict
-        Standard deviation of the logarithm of each of `parameters_and_sum`, by label.
+    The noise is that of its traces, whatever gripper the identification assumes.
     """
-    experiment = case.experiment
-    time_s, _, rotation = read_target(target, case.times_s)
-    log_truth = experiment.logs(case.parameters)
-    _, sensitivity = experiment.of(time_s, rotation).residuals(log_truth)
-    noise_sd = standard_deviation(rotation, case.noise)
-    return {
-        quantity.label: least_sd(sensitivity, noise_sd, log_truth, quantity)
-        for quantity in parameters_and_sum(experiment.searched)
-    }
+    noise_sd = noise_of_readings(case, case.times_s)
+    return bounds_percent(case.experiment, noise_sd, case.parameters, case.times_s)
 
 
 def read_intervals(study: Study, path: Path) -> pd.DataFrame:
-    """Read the intervals of a batch, which are of the same quantities in each of its seeds.
-
-    Seeds that are judged in full have all quantities.
-    """
-    case, frame = study.cases[path.parent.name], records.INTERVALS.read(path)
+    """Read the intervals of a batch of a case, a row for each quantity and seed."""
+    case = study.cases[path.parent.name]
     every = [quantity.label for quantity in parameters_and_sum(case.experiment.searched)]
-    estimated = frame.loc[frame["estimate_rest_known"].notna(), "quantity"].unique()
-    often = case.block.identifiability.verdicts_every
-    wanted = (
-        (case.name, quantity, seed)
-        for seed in seeds_of(path.stem)
-        for quantity in (estimated if seed % often else every)
-    )
-    require_rows(path, frame, ("case", "quantity", "seed"), wanted)
-    return frame
+    return records.INTERVALS.read(path, case=[case.name], quantity=every, seed=seeds_of(path.stem))
 
 
 def _judged_seeds(study: Study) -> str:
@@ -227,20 +198,17 @@ def _judged_seeds(study: Study) -> str:
     return "every seed" if 1 in every else f"one of {every.pop()} seeds"
 
 
-def _spreads(fitted: pd.DataFrame, truth: float, least_sd: float, confidence: float) -> Row:
+def _spreads(fitted: pd.DataFrame, truth: float, bound: float, confidence: float) -> Row:
     """Return bound, spread and coverage of a quantity; nothing of one without intervals."""
     if fitted.empty:
         return {}
-    spread, rest_known = (
-        100 * float(np.std(np.log(fitted[name].to_numpy(float)), ddof=1))
-        for name in ("estimate", "estimate_rest_known")
-    )
+    errors = np.log(fitted["estimate"].to_numpy(float) / truth)
+    spread = 100 * float(np.std(errors, ddof=1))
     return {
-        "bound_percent": least_sd,
+        "bound_percent": bound,
         "spread_percent": spread,
-        "spread_over_bound": spread / least_sd,
-        "rest_known_over_bound": rest_known / least_sd,
-        "bias_percent": np.mean(100 * np.log(fitted["estimate"].to_numpy(float) / truth)),
+        "spread_over_bound": spread / bound,
+        "bias_percent": np.mean(100 * errors),
         "confidence_percent": 100 * confidence,
         "coverage_percent": 100 * np.mean(_holds(fitted, truth)),
         "seeds": len(fitted),

@@ -1,10 +1,7 @@
-"""Points of a sweep: errors of what is identified, and the share of seeds in the true basin.
-
-`judge_points` writes them, a row per point, method and quantity; a table shows some.
-"""
+"""Points of a sweep: errors of what is identified, and the share of seeds in the true basin."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -15,26 +12,16 @@ import pandas as pd
 import biogrip.levels as levels
 import biogrip_study.records.identifications as records
 from biogrip.arrays import BoolArray
-from biogrip.judging.likelihood import Quantity, bounds_percent, quantity_value
+from biogrip.judging.likelihood import quantity_value
 from biogrip.physics.noise import rms
 from biogrip.physics.simulation import simulated_response
 from biogrip_study.config.study import Case, Study
 from biogrip_study.config.study_blocks import AxisBlock
 from biogrip_study.methods.genome import nearest_encodable
 from biogrip_study.methods.registry import METHODS
-from biogrip_study.records.rows import RowFile
 from biogrip_study.tables.cases import error_percent
 from biogrip_study.tables.layout import Column, Row, ShownTable
-
-POINTS = RowFile(
-    "a sweep",
-    (
-        *("point", "row", "column", "method", "quantity", "seeds"),
-        *("near_noise_share", "basin_share"),
-        *("median_absolute_error_percent", "basin_error_percent", "bound_percent"),
-    ),
-    words=("point", "row", "column", "method", "quantity"),
-)
+from biogrip_study.tables.study import bounds_at_truth
 
 # Log factor, and multiple of the bound, within which a value is in the basin of the truth.
 _FACTOR, _BOUNDS_OF_BASIN = math.log(2), 4.0
@@ -46,60 +33,38 @@ def headlines(bounds: Sequence[tuple[str, float]]) -> list[str]:
     Quantities count if their bound in percent, not NaN, is below `DETERMINED_PERCENT` at half of
     the points or more. Parts of a sum, which may trade against each other, do not count beside it.
     """
-    told = pd.DataFrame(bounds, columns=["label", "percent"]).dropna()
-    medians = told.groupby("label")["percent"].median().sort_values(kind="stable")
+    percents = pd.DataFrame(bounds, columns=["label", "percent"]).dropna()
+    medians = percents.groupby("label")["percent"].median().sort_values(kind="stable")
     parts = {part for label in medians.index if " + " in label for part in label.split(" + ")}
     determined = medians.index[medians < levels.DETERMINED_PERCENT].difference(parts, sort=False)
     return [*determined[:1], *determined[1:][-1:]]
 
 
-def judge_points(study: Study, sweep: str, identifications: list[Path], points: Path) -> None:
-    """Compute errors and shares of successful seeds at every point of a sweep.
+def judge_point(
+    case: Case, bounds: Mapping[str, float], heads: Sequence[str], identifications: Sequence[Path]
+) -> dict[str, Row]:
+    """Return what the table has of the headlined quantities of a point, by quantity.
 
-    Batches of identifications are in folders named like point and method.
+    Given are the bounds of all quantities in percent, and identifications of all points.
     """
-    block, rows = study.config.sweeps[sweep], list[tuple[str | int, ...]]()
-    for name in block.cases:
-        true, grid, bounds = study.cases[name].parameters, block.points(sweep, name), {}
-        for point in grid:
-            case = study.points[point.name]
-            bounds[point.name] = bounds_percent(case.experiment, case.noise, true, case.times_s)
-        heads = headlines(
-            [(q.label, percent) for of_point in bounds.values() for q, percent in of_point]
-        )
-        for point, method in product(grid, study.config.methods):
-            case = study.points[point.name]
-            batches = [file for file in identifications if file.parts[-3:-1] == (case.name, method)]
-            runs = pd.concat([records.read_batch(file, case) for file in batches])
-            if case.noise.absent:
-                # Without noise, the misfit of the true values rounded to the genes' digits.
-                runs = runs.assign(noise_rms=_resolution(case, true))
-            head = point.name, point.row.shown, point.column.shown, method
-            judged = _judged(case, true, runs, bounds[point.name], heads)
-            rows += ((*head, *numbers) for numbers in judged)
-    POINTS.write(points, rows)
-
-
-def _judged(
-    point: Case,
-    true: Mapping[str, float],
-    runs: pd.DataFrame,
-    bounds: list[tuple[Quantity, float]],
-    heads: list[str],
-) -> Iterator[tuple[str | int, ...]]:
-    """Yield quantity, number of runs, shares, median errors and bound in percent."""
-    found = records.values_by_quantity(runs, point.experiment.searched)
-    inside = np.ones(len(runs), dtype=bool)
-    for quantity, percent in bounds:
-        if (label := quantity.label) in heads:
-            inside &= in_basin(found[label], quantity_value(label, true), percent / 100)
-    near = np.mean(records.near_noise(runs, point.study))
-    shares = near, np.mean(inside) if heads else np.nan
-    for quantity, percent in bounds:
-        truth = quantity_value(quantity.label, true)
-        errors = abs(error_percent(truth, found[quantity.label]))
-        numbers = *shares, errors.median(), errors[inside].median(), percent
-        yield quantity.label, len(runs), *("" if np.isnan(x) else f"{x:.6g}" for x in numbers)
+    told: dict[str, Row] = {q: {"quantity": q, "bound_percent": bounds[q]} for q in heads}
+    for method in case.study.config.methods:
+        batches = [file for file in identifications if file.parts[-3:-1] == (case.name, method)]
+        runs = pd.concat([records.read_batch(file, case) for file in batches])
+        if case.noise.absent:
+            # Without noise, the misfit of the true values rounded to the genes' digits.
+            runs = runs.assign(noise_rms=_resolution(case))
+        values = records.values_by_quantity(runs, case.experiment.searched)
+        truth = {q: quantity_value(q, case.parameters) for q in heads}
+        inside = np.all([in_basin(values[q], truth[q], bounds[q] / 100) for q in heads], axis=0)
+        least = _LEAST_PERCENT if case.noise.absent else 0.0
+        for quantity, row in told.items():
+            errors = abs(error_percent(truth[quantity], values[quantity]))
+            row[f"near_noise_{method}"] = np.mean(records.near_noise(runs, case.study))
+            row[f"basin_{method}"] = np.mean(inside)
+            row[f"basin_error_{method}"] = np.maximum(errors[inside].median(), least)
+            row[f"error_{method}"] = np.maximum(errors.median(), least)
+    return told
 
 
 def in_basin(values: Any, truth: float | None, bound: float) -> BoolArray:
@@ -113,27 +78,27 @@ def in_basin(values: Any, truth: float | None, bound: float) -> BoolArray:
     return np.asarray(away <= np.fmax(_FACTOR, _BOUNDS_OF_BASIN * bound))
 
 
-def _resolution(point: Case, true: Mapping[str, float]) -> float:
+def _resolution(point: Case) -> float:
     """Return the noise-free RMS misfit of the encodable parameters nearest to the truth."""
     experiment = point.experiment
-    rounded = dict(true)
+    rounded = dict(point.parameters)
     for parameter in experiment.searched.parameters:
         genes = experiment.ranges[parameter.range_name]
-        rounded[parameter.name] = nearest_encodable(true[parameter.name], genes)
+        rounded[parameter.name] = nearest_encodable(rounded[parameter.name], genes)
     model, given = experiment.model, (experiment.torque, point.times_s)
-    both = [model.sample(values) for values in (true, rounded)]
+    both = [model.sample(values) for values in (point.parameters, rounded)]
     return rms(np.subtract(*(simulated_response(experiment.gripper, of, *given) for of in both)))
 
 
-# By column of points: name and heading of the columns that the table has for every method.
+# Column of every method, and its heading.
 _BY_METHOD = {
-    "near_noise_share": ("near_noise", "Share {near_noise}"),
-    "basin_share": ("basin", "Share in the true basin"),
-    "basin_error_percent": ("basin_error", "Median abs. error there %"),
-    "median_absolute_error_percent": ("error", "Median abs. error of all %"),
+    "near_noise": "Share {near_noise}",
+    "basin": "Share in the true basin",
+    "basin_error": "Median abs. error there %",
+    "error": "Median abs. error of all %",
 }
-# Errors, and the least that is told without noise, where rounding decides how a fit ends.
-_ERRORS, _LEAST_PERCENT = [name for name in _BY_METHOD if "error" in name], 1.0
+# The least error that is told without noise, where rounding decides how a fit ends.
+_LEAST_PERCENT = 1.0
 _CAPTION = (
     "{title}: of every case the best and the worst determined quantity. In the basin of the truth "
     "are seeds within a factor of two of it, or four times the bound if that is more, in both. "
@@ -145,21 +110,23 @@ _CAPTION = (
 )
 
 
-def robustness(study: Study, sweep: str, points: Path) -> ShownTable:
-    """Return a row for each point of a sweep and the best and worst determined quantity."""
-    block, frame = study.config.sweeps[sweep], POINTS.read(points)
-    silent = frame["bound_percent"].isna()
-    frame.loc[silent, _ERRORS] = frame.loc[silent, _ERRORS].clip(lower=_LEAST_PERCENT)
-    rows: list[Row] = []
-    for case, of_case in frame.groupby(frame["point"].str.partition("--")[0], sort=False):
-        first = of_case[of_case["method"] == study.shown_method.name]
-        for quantity in headlines([*zip(first["quantity"], first["bound_percent"], strict=True)]):
-            chosen = of_case[of_case["quantity"] == quantity]
-            for _, at_point in chosen.groupby("point", sort=False):
-                row = {"case": case, **at_point.iloc[0]}
-                for method, values in at_point.set_index("method").iterrows():
-                    row |= {f"{to}_{method}": values[of] for of, (to, _) in _BY_METHOD.items()}
-                rows.append(row)
+def robustness(study: Study, sweep: str, identifications: list[Path]) -> ShownTable:
+    """Return a row for each point of a sweep and the best and worst determined quantity.
+
+    Batches of identifications are in folders named like point and method.
+    """
+    block, rows = study.config.sweeps[sweep], list[Row]()
+    for name in block.cases:
+        grid = [(point, study.points[point.name]) for point in block.points(sweep, name)]
+        bounds = [{q.label: bound for q, bound in bounds_at_truth(case)} for _, case in grid]
+        heads = headlines([pair for of_point in bounds for pair in of_point.items()])
+        judged = [
+            judge_point(case, of_point, heads, identifications)
+            for (_, case), of_point in zip(grid, bounds, strict=True)
+        ]
+        for quantity, ((point, _), told) in product(heads, zip(grid, judged, strict=True)):
+            head = {"case": name, "row": point.row.shown, "column": point.column.shown}
+            rows.append(head | told[quantity])
     words = records.near_noise_words(study)
     columns = (
         Column("case", "Case"),
@@ -172,7 +139,7 @@ def robustness(study: Study, sweep: str, points: Path) -> ShownTable:
                 f"{heading.format(near_noise=words)}, {METHODS[method].title}",
                 2,
             )
-            for ours, heading in _BY_METHOD.values()
+            for ours, heading in _BY_METHOD.items()
             for method in study.config.methods
         ),
         Column("bound_percent", "Bound, rest known %", 2),
