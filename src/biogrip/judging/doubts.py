@@ -324,15 +324,7 @@ def _about_changes(left: _Left, *, coloured: bool) -> list[str]:
             rms = f"The RMS residual is {plain(left.times, 2)} times the noise of the trace"
             said.insert(0, f"{rms}; the closest linear sample leaves {least} times the noise.")
         return said
-    split = middle_of(residuals)
-    chance = 1.0 if coloured else whiteness.compare_halves(residual, basis, split)
-    if chance >= levels.FALSE_ALARM:
-        return []
-    return [
-        f"The readings up to {plain(trace.time_s[split - 1])} s and those after it, each fitted "
-        f"by itself, differ by more than white noise ({p_value(chance)}): the sample, the "
-        "instrument or the protocol changed, and the values may be far off."
-    ]
+    return []
 
 
 def _is_coloured(step: whiteness.Step) -> bool:
@@ -340,14 +332,6 @@ def _is_coloured(step: whiteness.Step) -> bool:
     given = step.left, step.basis
     chance = min(whiteness.correlated(*given)[1], whiteness.wandering(*given))
     return chance < levels.FALSE_ALARM
-
-
-def middle_of(residuals: Residuals) -> int:
-    """Return the reading at which phases part a trace, or the middle one."""
-    count = residuals.samples
-    starts = np.searchsorted(residuals.trace.time_s, residuals.course.changes_s)
-    nearest = int(starts[np.argmin(np.abs(starts - count // 2))]) if len(starts) else 0
-    return nearest if count // 4 <= nearest <= count - count // 4 else count // 2
 
 
 def _about_outliers(residuals: Residuals, struck: BoolArray) -> Iterator[str]:

@@ -9,8 +9,7 @@ for what is slow.
 A step of all readings from some time on is one direction more: its share of the sum of squares is
 beta-distributed in white noise. `find_step` scans all times; the chance that a scan of correlated
 statistics exceeds a level is that of the first one, and for each further one that of a random
-walk's upcrossing [9]_. `compare_halves` asks whether two parts of the trace, fitted apart, agree:
-Chow's test [8]_, with the fit's slopes. Inertia in a frequency sweep is one direction more, too.
+walk's upcrossing [9]_. Inertia in a frequency sweep is one direction more, too.
 
 Residuals, (n_samples,), are over the noise's standard deviation where that is not the same. The
 basis of what the fit absorbs has orthonormal rows, (n_directions, n_samples), see `absorbed`.
@@ -22,7 +21,6 @@ References
 .. [4] H. D. Patterson and R. Thompson, Biometrika 58 (1971), 545-554: restricted likelihood.
 .. [5] F. E. Satterthwaite, Biometrics Bulletin 2 (1946), 110-114.
 .. [6] H. Akaike, IEEE Transactions on Automatic Control 19 (1974), 716-723.
-.. [8] G. C. Chow, Econometrica 28 (1960), 591-605: equality of two regressions.
 .. [9] D. Siegmund and B. Yakir, The Statistics of Gene Mapping, Springer, 2007: section 5.2.
 """
 
@@ -35,7 +33,6 @@ from scipy.special import betainc, betaincc, fdtrc, ndtr, ndtri, pdtrc, stdtr
 import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.digits import plain
-from biogrip.fit.trace_noise import absorbed
 from biogrip.physics.noise import without
 from biogrip.physics.protocol import is_storage
 from biogrip.physics.residuals import Residuals
@@ -208,8 +205,6 @@ def _restricted(covariance: Array, left: Array, taken: Array) -> tuple[float, fl
     return free * np.log(size) + 2 * float(determinants), size
 
 
-# Norm of directions of a part, without what the whole fit absorbs, that are more than rounding.
-_MORE = 1e-6
 # Most numbers in the steps that are scanned.
 _AT_ONCE = 4_000_000
 
@@ -305,24 +300,6 @@ def find_step(residual: Array, basis: Array, cleared: Callable[[Array], Array]) 
         residual - size * direction,
         np.vstack((basis, direction)),
     )
-
-
-def parts_apart(basis: Array, split: int) -> Array:
-    """Return what fits to the parts before and after a reading absorb beside one to both."""
-    apart = without(basis, np.where(np.arange(basis.shape[1]) < split, basis, 0.0))
-    apart = apart[np.linalg.norm(apart, axis=1) > _MORE]
-    return absorbed(apart) if len(apart) else apart
-
-
-def compare_halves(residual: Array, basis: Array, split: int) -> float:
-    """Return the chance that parts of white noise before and after a reading differ as much."""
-    more = parts_apart(basis, split)
-    left = len(residual) - len(basis) - len(more)
-    if not len(more) or left < 1:
-        return 1.0
-    gained = float(np.sum((more @ residual) ** 2))
-    rest = max(float(residual @ residual) - gained, 1e-300)
-    return float(fdtrc(len(more), left, gained / len(more) * left / rest))
 
 
 def find_inertia(
