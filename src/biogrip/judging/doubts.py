@@ -309,29 +309,27 @@ def _about_changes(left: _Left, *, coloured: bool) -> list[str]:
         is_inertia, cause = whiteness.find_inertia(residuals, residual, basis, growth)
         return [f"The fit leaves what is of {cause}."] if is_inertia and not coloured else []
     step = whiteness.find_step(residual, basis, lambda it: trace.condensed.cleared(it) / growth)
-    if step and step.chance < levels.FALSE_ALARM and not (coloured and _is_coloured(step)):
-        before_s, after_s = trace.time_s[step.before - 1 : step.before + 1]
-        size = f"{plain(-step.size, 2)} {residuals.instrument.read.unit}".rstrip()
-        what = f"readings change at about {plain(0.5 * (before_s + after_s))} s"
-        away = "what is before or after (--from, --until)"
-        if step.before == 1:
-            what = f"first reading ({plain(before_s)} s) does not fit the rest"
-            away = "that reading (--from)"
-        by = f"as by a step of {size}: white noise hardly does that ({p_value(step.chance)})"
-        said = [f"The {what}, {by}, and the values may be far off. Leave out {away}."]
-        if left.times > levels.CLEARLY:
-            least = plain(fit_any_sample(residuals).sd / left.scale, 2)
-            rms = f"The RMS residual is {plain(left.times, 2)} times the noise of the trace"
-            said.insert(0, f"{rms}; the closest linear sample leaves {least} times the noise.")
-        return said
-    return []
-
-
-def _is_coloured(step: whiteness.Step) -> bool:
-    """Return True if what a fit leaves with a step is not white noise, either."""
-    given = step.left, step.basis
-    chance = min(whiteness.correlated(*given)[1], whiteness.wandering(*given))
-    return chance < levels.FALSE_ALARM
+    if step is None or step.chance >= levels.FALSE_ALARM:
+        return []
+    # What a fit with a step leaves has to be white noise, if what it leaves without one is not.
+    rest = step.left, step.basis
+    chance = min(whiteness.correlated(*rest)[1], whiteness.wandering(*rest)) if coloured else 1.0
+    if chance < levels.FALSE_ALARM:
+        return []
+    before_s, after_s = trace.time_s[step.before - 1 : step.before + 1]
+    size = f"{plain(-step.size, 2)} {residuals.instrument.read.unit}".rstrip()
+    what = f"readings change at about {plain(0.5 * (before_s + after_s))} s"
+    away = "what is before or after (--from, --until)"
+    if step.before == 1:
+        what = f"first reading ({plain(before_s)} s) does not fit the rest"
+        away = "that reading (--from)"
+    by = f"as by a step of {size}: white noise hardly does that ({p_value(step.chance)})"
+    said = [f"The {what}, {by}, and the values may be far off. Leave out {away}."]
+    if left.times > levels.CLEARLY:
+        least = plain(fit_any_sample(residuals).sd / left.scale, 2)
+        rms = f"The RMS residual is {plain(left.times, 2)} times the noise of the trace"
+        said.insert(0, f"{rms}; the closest linear sample leaves {least} times the noise.")
+    return said
 
 
 def _about_outliers(residuals: Residuals, struck: BoolArray) -> Iterator[str]:

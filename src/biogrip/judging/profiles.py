@@ -126,7 +126,7 @@ class Finding:
 
     def words(self) -> str:
         """Return the verdict in words, e.g. ``determined: 34.1 N/m (31.2 to 37.3)``."""
-        words, unit = self._limits_in_words(), self._unit
+        words, unit = self._limits_in_words(), f" {self.quantity.unit}".rstrip()
         if self.gaps:
             ends = (end for gap in self.gaps for end in gap)
             gaps = within_limits(self.value, self.low or 0.0, self.high or 0.0, *ends)[3:]
@@ -137,7 +137,7 @@ class Finding:
         return words
 
     def _limits_in_words(self) -> str:
-        low, high, unit = self.low, self.high, self._unit
+        low, high, unit = self.low, self.high, f" {self.quantity.unit}".rstrip()
         if low is not None and high is not None:
             decades = plain(math.log10(high / low), 2)
             how = f" only to {decades} decades" if self.is_wide else ""
@@ -150,10 +150,6 @@ class Finding:
             slowest = f"a branch of the best fit relaxes in {plain(self.slowest_s, 2)} s,"
             return f"not stated: {slowest} longer than the trace lasts"
         return "not determined: the trace sets no limit within the search range"
-
-    @property
-    def _unit(self) -> str:
-        return f" {self.quantity.unit}" if self.quantity.unit else ""
 
 
 @dataclass(frozen=True)
