@@ -85,10 +85,6 @@ CONSTANT, CONSTANT_OF_PEAK, FEWEST_BEFORE = 2.0, 1e-3, 3
 """Standard deviation of constant readings, in noise and in peaks of noise-free traces, and fewest
 of which it is known. Chosen."""
 
-OF_WHAT_A_START_GAINS = 0.5
-"""Share of the fall of chi^2 that a late start needs which any linear sample has to reach from
-where the start was guessed, before it is fitted: moving it a little gains the rest. Chosen."""
-
 OFFSET = 40.0
 """Fall of chi^2 by which an offset is better than a late start: by chance once in a billion."""
 

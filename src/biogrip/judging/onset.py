@@ -25,7 +25,7 @@ from scipy.special import chdtri
 import biogrip.levels as levels
 from biogrip.arrays import Array, IntArray
 from biogrip.digits import instant, plain
-from biogrip.fit.any_sample import fit_any_sample, fit_responses, spread_lags
+from biogrip.fit.any_sample import fit_responses, spread_lags
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import LeastSquaresSettings, fit_from, identify_many
 from biogrip.fit.problem import TraceProblem, silent
@@ -279,10 +279,6 @@ def _about_late_onset(fits: OnsetFits, diagnosis: Diagnosis, guess_s: float) -> 
     trace, noise_sd = (fits.time_s, fits.readings), fits.experiment.noise_sd
     given, needed = fits.at(0.0, diagnosis.likelihood.best), chdtri(1, levels.SURELY)
     fall_to = partial(compute_fall, len(trace[0]), given.misfit, noise_sd=noise_sd)
-    # Fitted along, a start cannot gain more than any sample, but for what moving it a little does.
-    of_any_sample = fit_any_sample(fits.posed(guess_s).residuals).misfit
-    if fall_to(of_any_sample) < levels.OF_WHAT_A_START_GAINS * needed:
-        return
     found = fits.best(guess_s)
     fall = fall_to(found.misfit)
     if fall < needed or not begins_constant(*trace, found.onset_s):

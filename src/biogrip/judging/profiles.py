@@ -542,12 +542,8 @@ def _find_crossings(points: Points) -> tuple[Array, Array]:
         last = np.searchsorted(of_below, profile, "right") - 1
         inside = below[np.where(end == 0, first, last)]
         outside = np.where(end == 0, inside - 1, inside + 1)
-        both = np.stack((inside, outside))
-        values, increases, x = points.values[both], points.increases[both], points.x[both]
-        elsewhere = points.extremes()[:, fits.trace[profile]]
-        limits, fitted = crossings(fits, profile, values, increases, x, elsewhere)
+        limits, fitted = _crossings(points, profile, np.stack((inside, outside)))
         crossed[end, profile], at_crossings[end, profile] = limits, fitted
-        points.increases[both], points.x[both] = increases, x
         # Where the outer point has come below the threshold, the next bracket is further out.
         on = np.isnan(limits) & (outside != ends[end, profile])
         end, profile = end[on], profile[on]
@@ -558,38 +554,22 @@ def _find_crossings(points: Points) -> tuple[Array, Array]:
 _MOST_FITS_OF_CROSSING, _WIDTH_OF_JUMP = 40, 1e-7
 
 
-def crossings(
-    fits: ConstrainedFits,
-    profile: IntArray,
-    values: Array,
-    increases: Array,
-    x: Array,
-    elsewhere: Array,
-) -> tuple[Array, Array]:
+def _crossings(points: Points, profile: IntArray, both: IntArray) -> tuple[Array, Array]:
     """Find the logarithms of quantities at which the increase of chi^2 equals the threshold, (n,).
 
     1. A value is tried between an inner end, below the threshold, and an outer, above it.
     2. It is fitted from both ends and between: they may lie in different basins, of which the
-       deeper one counts. At first the best fit from elsewhere is one more start.
+       deeper one counts. At first the best fit from the ends of all profiles is one more start.
     3. Where the basin is deeper than that of the outer end, the outer end is fitted from there.
     4. One end of each bracket moves to the value, until the threshold or a jump is met.
 
-    Parameters
-    ----------
-    profile
-        Profile of each crossing, (n,).
-    values, increases, x
-        Logarithms, increases of chi^2 and fits of both ends, (2, n) or (2, n, n_parameters). Lower
-        fits that are found at outer ends replace theirs, in place.
-    elsewhere
-        Starts that may lead to deeper basins, (n_starts, n, n_parameters).
-
-    Returns
-    -------
-    tuple[Array, Array]
-        The crossings, NaN where a deeper basin is below the threshold at the outer end, as the
-        crossing is further out; and their fits, (n, n_parameters).
+    Given are the profile of each crossing, (n,), and its inner and outer point, (2, n). Returns the
+    crossings, NaN where a deeper basin is below the threshold at the outer end, as the crossing is
+    further out; and their fits, (n, n_parameters).
     """
+    fits, outer_point = points.fits, both[1]
+    values, increases, x = points.values[both], points.increases[both], points.x[both]
+    elsewhere = points.extremes()[:, fits.trace[profile]]
     threshold = fits.threshold[profile]
     ends, ends_x, excess = values.copy(), x.copy(), excess_of(increases, threshold)
     crossed, at_crossings, left = values[1].copy(), x[1].copy(), np.arange(len(profile))
@@ -610,8 +590,8 @@ def crossings(
         if np.any(missed):
             outer = left[missed]
             beyond = fits.at(profile[outer], values[1, outer], fitted[missed], FINE)
-            keep_lower(increases[1], x[1], outer, *beyond)
-        void = increases[1, left] < threshold[left]
+            keep_lower(points.increases, points.x, outer_point[outer], *beyond)
+        void = points.increases[outer_point[left]] < threshold[left]
         crossed[left], at_crossings[left] = np.where(void, np.nan, tried), fitted
         side = (over > 0).astype(np.int64)
         ends[side, left], ends_x[side, left], excess[side, left] = tried, fitted, over
