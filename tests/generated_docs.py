@@ -34,9 +34,8 @@ from biogrip.fit.least_squares import identify_many
 from biogrip.fit.problem import silent
 from biogrip.physics.drawing import sketched
 from biogrip.physics.models import ALIASES, MODELS
-from biogrip.physics.modes import linear_responses
 from biogrip.physics.noise import add_noise, standard_deviation, stream
-from biogrip.physics.simulation import simulated_response
+from biogrip.physics.response import linear_responses, simulated_response
 from biogrip_study.config.study import Case
 from biogrip_study.page import answers
 from biogrip_study.records.identifications import share_in_words

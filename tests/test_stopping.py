@@ -100,6 +100,21 @@ def test_a_link_in_the_place_of_a_scratch_file_is_not_followed(tmp_path: Path) -
         assert {it.name for it in tmp_path.iterdir()} == {"found.csv", "victim.txt"}
 
 
+def test_what_a_killed_process_has_left_goes_with_the_next_write(tmp_path: Path) -> None:
+    """But not what one that still runs is writing, nor what only looks like it."""
+    (over := subprocess.Popen(["true"])).wait()
+    file = tmp_path / "found[1].csv"
+    kept = [
+        f".{file.name}.{os.getppid()}.part",
+        f".{file.name}.old.part",
+        f".1.csv.{over.pid}.part",
+    ]
+    for name in (f".{file.name}.{over.pid}.part", *kept):
+        (tmp_path / name).write_text("a,")
+    write_text(file, "a,b\n")
+    assert {it.name for it in tmp_path.iterdir()} == {file.name, *kept}
+
+
 def test_what_is_ignored_stays_so(tmp_path: Path) -> None:
     code = f"import signal; signal.signal({signal.SIGINT}, signal.SIG_IGN)"
     code += BEGIN + f"os.kill(os.getpid(), {signal.SIGINT}); print('goes on')"

@@ -45,6 +45,10 @@ def atomic_write(path: Path) -> Iterator[Path]:
     unfinished.add(str(scratch))
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
+        for left in left_in(path.parent, ".*.[0-9]*.part"):
+            # What has another name may be another machine's, which goes on.
+            if left.name.startswith(f".{path.name}."):
+                left.unlink(missing_ok=True)
         # A link that somebody has put there is not followed.
         scratch.unlink(missing_ok=True)
         scratch.touch(exist_ok=False)
@@ -79,6 +83,13 @@ def scratch_path(path: Path) -> Path:
     return path.with_name(f".{path.name}.{os.getpid()}.part")
 
 
+@cache
+def left_in(folder: Path, pattern: str) -> list[Path]:
+    """Return what killed processes have left, whose number stands before the last dot."""
+    every = folder.glob(pattern) if os.path.exists("/proc/self") else ()
+    return [it for it in every if not os.path.exists(f"/proc/{it.name.split('.')[-2]}")]
+
+
 def write_text(path: Path, text: str) -> None:
     """Write a text file atomically."""
     with atomic_write(path) as scratch:
@@ -102,12 +113,9 @@ def software(*others: Path) -> dict[str, str]:
         for file in sorted(folder.rglob("*"))
         if file.suffix in (".py", ".yaml", ".j2", ".css", ".js")
     )
+    digest = hashlib.sha256(source.encode()).hexdigest()[:12]
     versions = {name: version(name) for name in ("numpy", "scipy")}
-    return {
-        "biogrip": __version__,
-        **versions,
-        "source": hashlib.sha256(source.encode()).hexdigest()[:12],
-    }
+    return {"biogrip": __version__, **versions, "source": digest}
 
 
 def write_rows(path: Path, columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:

@@ -31,7 +31,7 @@ from biogrip.physics.instruments import GRIPPER, INSTRUMENTS, Instrument
 from biogrip.physics.models import Sample
 from biogrip.physics.noise import Noise, add_noise
 from biogrip.physics.protocol import Phase, hold
-from biogrip.physics.simulation import simulated_response
+from biogrip.physics.response import simulated_response
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -52,7 +52,7 @@ def served() -> Iterator[tuple[str, int]]:
         assert server.stdout
         place = server.stdout.readline().strip()
         assert re.fullmatch(r"http://127\.0\.0\.1:\d+/[\w-]{32}/", place)
-        kept = [*Path("/tmp").glob("biogrip_*")]
+        kept = [*Path("/tmp").glob("biogrip.*")]
         yield place, server.pid
         server.send_signal(signal.SIGINT)
         assert server.wait(20) == 0
@@ -315,6 +315,22 @@ def test_what_runs_ends_with_the_program() -> None:
         (command,) = " ".join((task / "children").read_text() for task in tasks).split()
         assert Path(f"/proc/{command}").exists()
     assert not Path(f"/proc/{command}").exists()
+
+
+@pytest.mark.nightly
+def test_what_a_killed_program_has_left_goes_with_the_next() -> None:
+    """But not what one that runs keeps."""
+    command = [sys.executable, "-m", "biogrip", "app", "--no-browser"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE) as killed:
+        assert killed.stdout
+        assert killed.stdout.readline()
+        (left,) = Path("/tmp").glob(f"biogrip.{killed.pid}.*")
+        with served():
+            assert left.exists()
+        killed.kill()
+    assert left.exists()
+    with served():
+        assert not left.exists()
 
 
 @pytest.mark.nightly

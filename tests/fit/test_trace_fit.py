@@ -16,7 +16,7 @@ from biogrip.fit.trace_noise import NoiseModel
 from biogrip.levels import OUTLYING
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.noise import AR1, Drift, Noise, Outliers, add_noise
-from biogrip.physics.simulation import simulated_response
+from biogrip.physics.response import simulated_response
 from tests.helpers.default import STUDY
 
 CASE = STUDY.cases["liquid_drop_2"]

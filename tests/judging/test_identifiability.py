@@ -22,8 +22,8 @@ from biogrip.judging.likelihood import (
 )
 from biogrip.judging.profiles import BOUNDED_ABOVE, DETERMINED, NOT_DETERMINED
 from biogrip.physics.models import CANDIDATES, MODELS, Sample
+from biogrip.physics.response import Grip
 from biogrip.physics.sample_model import Network
-from biogrip.physics.simulation import Grip
 from tests.helpers.default import seen
 from tests.helpers.problems import (
     MODEL,

@@ -13,13 +13,11 @@ from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import NO_ARMS, Gripper
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.models import MODELS, Sample
-from biogrip.physics.modes import linear_responses
 from biogrip.physics.noise import nuisance_basis, within, without
 from biogrip.physics.protocol import Course, Phase, hold, join_phases, sample_times
 from biogrip.physics.residuals import CondensedTrace, Residuals
-from biogrip.physics.response import step_response, superpose
+from biogrip.physics.response import linear_responses, simulated_response, step_response, superpose
 from biogrip.physics.sample_model import SampleModel, with_fixed
-from biogrip.physics.simulation import simulated_response
 from biogrip_study.methods.misfit import SeriesMisfit
 from tests.helpers.problems import condensed_of
 from tests.helpers.responses import PROTOCOLS, log_range, random_samples
@@ -202,6 +200,17 @@ def test_nuisance_takes_out_offset_and_drift_and_nothing_else(offset: bool, drif
     wave = without(basis, np.sin(times))
     np.testing.assert_allclose(without(basis, wave + added), wave, atol=1e-12)
     np.testing.assert_allclose(within(basis, wave + added), added, atol=1e-12)
+
+
+def test_directions_with_corners_are_projected_out_of_all_readings(
+    gripper: Gripper, steps: Course
+) -> None:
+    """As those of a load that was smoothed: no polynomial of a piece carries a corner."""
+    times = np.linspace(0.0, 400.0, 5001)
+    corners = np.maximum(0.0, times[None] - np.array([[57.3], [260.0]]))
+    rows = Condensed(steps, times, np.linalg.qr(corners.T)[0].T)
+    residuals = posed(gripper, MODELS["maxwell"], rows, noise(5001))
+    assert_alike(residuals, np.log([2.0, 50.0]))
 
 
 READ_S = np.arange(401.0)

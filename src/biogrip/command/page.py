@@ -39,7 +39,7 @@ from biogrip.page.templates import data_url, environment
 from biogrip.physics.drawing import sketched
 from biogrip.physics.models import Sample
 from biogrip.physics.protocol import evaluate, hold, join_phases, largest_load
-from biogrip.physics.simulation import simulated_response
+from biogrip.physics.response import simulated_response
 from biogrip.terminal import visible_lines
 
 _STATUS_MARKS = {OK: "✓", DOUBTFUL: "!", REJECTED: "✕"}

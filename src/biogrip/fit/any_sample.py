@@ -18,9 +18,9 @@ import numpy as np
 
 from biogrip.arrays import Array, BoolArray
 from biogrip.fit.trace_noise import absorbed
-from biogrip.physics.modes import Modes
 from biogrip.physics.protocol import Course
 from biogrip.physics.residuals import Residuals
+from biogrip.physics.response import Modes
 
 # Lags: shortest over the time between the closest readings, longest over the protocol.
 _SHORTEST, _LONGEST = 0.01, 10.0

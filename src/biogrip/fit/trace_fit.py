@@ -26,7 +26,7 @@ from biogrip.fit.trace_noise import (
     outliers_of,
 )
 from biogrip.physics.protocol import Phase, join_phases
-from biogrip.physics.simulation import simulated_response
+from biogrip.physics.response import simulated_response
 
 # Square of three standard uncertainties.
 _SECOND_ORDER = 9.0

@@ -11,7 +11,7 @@ from biogrip.judging.diagnosis import Diagnosis
 from biogrip.judging.doubts import NOT_LINEAR, REJECTED, REJECTION, find_reasons, order_notes
 from biogrip.judging.profiles import FIT_REJECTED, Finding
 from biogrip.physics.noise import within
-from biogrip.physics.simulation import simulated_response
+from biogrip.physics.response import simulated_response
 from biogrip.traces.reader import Recording
 
 

@@ -45,8 +45,8 @@ from biogrip.judging.likelihood import (
 from biogrip.judging.profiles import DETERMINED, Finding, Trade, compute_findings, find_trade_offs
 from biogrip.judging.what_moves import Move, find_moves
 from biogrip.judging.without_model import KINDS, WithoutModel, tell_without_model, times_told
+from biogrip.physics.response import Grip
 from biogrip.physics.sample_model import C_P
-from biogrip.physics.simulation import Grip
 from biogrip.traces.reader import Recording
 
 # Widening of a range, and the start beyond its end, in e-folds; and rounding.

@@ -31,7 +31,7 @@ import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.problem import TraceProblem
-from biogrip.physics.modes import linear_responses
+from biogrip.physics.response import linear_responses
 from biogrip.physics.sample_model import SampleModel
 
 # Slopes of hinges: a relaxation time of twice the experiment increases chi^2 by some 50, and one

@@ -28,10 +28,11 @@ import numpy as np
 from numpy.polynomial import chebyshev, legendre
 
 from biogrip.arrays import Array
-from biogrip.physics.modes import Modes, mode_responses, responses_in_turn, sum_of_modes
+from biogrip.physics.modes import mode_responses, responses_in_turn
 from biogrip.physics.noise import without
 from biogrip.physics.protocol import Course
 from biogrip.physics.rate_tables import ModeRows, SpanningModes
+from biogrip.physics.response import Modes, sum_of_modes
 
 _NODES_A_PIECE = 20
 # Square of a norm that may be rounding.
@@ -184,8 +185,12 @@ class Condensed:
     @cached_property
     def _dense(self) -> DenseSamples:
         """Nodes that replace the readings."""
-        # Whitened functions are not smooth: each reading is a node.
-        return DenseSamples(self.course, self.all_s, dense=self.whitening is None)
+        # Whitened functions are not smooth, nor are those of a load that was smoothed: each reading
+        # is a node then.
+        dense = DenseSamples(self.course, self.all_s, dense=self.whitening is None)
+        if all(dense.rows_of_samples(of)[1] < _ROUNDING_OF_NORM for of in self.functions):
+            return dense
+        return DenseSamples(self.course, self.all_s, dense=False)
 
     @cached_property
     def _modes(self) -> SpanningModes:

@@ -14,7 +14,7 @@ import biogrip_study.records.identifications as records
 from biogrip.arrays import BoolArray
 from biogrip.judging.likelihood import quantity_value
 from biogrip.physics.noise import rms
-from biogrip.physics.simulation import simulated_response
+from biogrip.physics.response import simulated_response
 from biogrip_study.config.study import Case, Study
 from biogrip_study.config.study_blocks import AxisBlock
 from biogrip_study.methods.genome import nearest_encodable
