@@ -432,13 +432,11 @@ def held_levels(course: Course) -> list[tuple[float, Course]]:
     heights = np.where(np.any(course.within_phases[:, 1:], axis=1), 0.0, course.within_phases[:, 0])
     order = np.argsort(np.abs(heights), kind="stable")
     order = order[np.abs(heights[order]) > levels.HELD * np.abs(heights).max(initial=0.0)]
-    groups: list[list[int]] = []
-    for phase in order.tolist():
-        close = levels.HELD * abs(heights[phase])
-        if groups and abs(heights[phase] - heights[groups[-1][0]]) < close:
-            groups[-1].append(phase)
-        else:
-            groups.append([phase])
+    starts = [0]
+    for place, phase in enumerate(order.tolist()):
+        if abs(heights[phase] - heights[order[starts[-1]]]) >= levels.HELD * abs(heights[phase]):
+            starts.append(place)
+    groups = np.split(order, starts[1:]) if len(order) else []
     found = []
     for group in groups:
         starts_s = np.concatenate((course.time_s[group], ends_s[group]))
