@@ -46,11 +46,8 @@ ADDS = "instrument"
 
 ALARMS = {
     "neighbours are correlated": "Neighbouring residuals",
-    "uneven spectrum": "more of some frequencies",
     "means of stretches": "residual wanders",
-    "line in the spectrum": "line in its spectrum",
     "step at any time": "readings change at",
-    "halves differ": "each fitted by itself",
     "outliers": "further from the fit than noise",
     "growing noise": "The noise grows",
     "misfit": "the noise of ",

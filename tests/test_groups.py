@@ -14,8 +14,15 @@ from biogrip.arrays import Array
 from biogrip.cli import main
 from biogrip.command.outputs import WRITTEN_BY
 from biogrip.figures.cells import ONE_COLUMN_IN, draw_cells
-from biogrip.judging.cells import FEWEST_CELLS, Cell, adjusted, cell_weights, compare
-from biogrip.judging.censored import censored_mean, pseudo_values
+from biogrip.judging.cells import (
+    FEWEST_CELLS,
+    Cell,
+    adjusted,
+    cell_weights,
+    censored_mean,
+    compare,
+    pseudo_values,
+)
 from tests.helpers.identified import identify
 from tests.helpers.places import ROOT
 from tests.helpers.simulated_groups import DOCUMENTED, Design, in_words

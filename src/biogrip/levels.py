@@ -75,10 +75,6 @@ FEWEST_INDEPENDENT, LEAST_FREEDOM = 0.3, 3.0
 """A misfit that is smooth over half a trace would seem worth next to nothing: so few hardly lower
 the share of limits that hold (`tests/judging/test_whiteness.py`)."""
 
-PERIODS, EVEN = 10, 0.01
-"""Fewest periods of a line, as what is slower may be misfit, and the largest difference of
-intervals, as a share, with which it has a spectrum. Chosen."""
-
 # The start of a protocol.
 
 SURELY = 1e-9
@@ -88,10 +84,6 @@ one."""
 CONSTANT, CONSTANT_OF_PEAK, FEWEST_BEFORE = 2.0, 1e-3, 3
 """Standard deviation of constant readings, in noise and in peaks of noise-free traces, and fewest
 of which it is known. Chosen."""
-
-OF_WHAT_A_START_GAINS = 0.5
-"""Share of the fall of chi^2 that a late start needs which any linear sample has to reach from
-where the start was guessed, before it is fitted: moving it a little gains the rest. Chosen."""
 
 OFFSET = 40.0
 """Fall of chi^2 by which an offset is better than a late start: by chance once in a billion."""

@@ -11,8 +11,8 @@ from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.fit import least_squares
 from biogrip.fit.least_squares import FINE, PRIOR_WIDTH, ROUGH, LocalFits, Minima, Normal, minimize
 from biogrip.fit.problem import TraceProblem, silent
-from biogrip.judging.constrained_fits import ConstrainedFits
 from biogrip.judging.likelihood import parameters_and_sum
+from biogrip.judging.profiles import ConstrainedFits
 from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.residuals import Residuals
 from biogrip.physics.sample_model import SampleModel, with_fixed

@@ -162,17 +162,17 @@ def test_offset_and_start_are_each_traces_own(*, fit_start: bool) -> None:
     assert (sample.findings[0].verdict == "determined") == fit_start
     for index in range(not fit_start, 3):
         found = sample.findings[index]
-        assert found.low is not None
-        assert found.high is not None
+        assert found.log_low is not None
+        assert found.log_high is not None
         if fit_start:
             # A start is allowed for to first order, and so is this.
             error = np.sqrt(np.linalg.inv(fit.jac.T @ fit.jac)[index, index])
-            half = (found.high - found.low) / 2
+            half = (found.log_high - found.log_low) / 2
             assert half == pytest.approx(np.sqrt(chi2.ppf(0.95, 1)) * error, rel=0.05)
         else:
             expected = limits(rows, fit.x, index, chi2.ppf(0.95, 1))
             tolerance = 1e-3 * (expected[1] - expected[0])
-            assert [found.low, found.high] == pytest.approx(expected, abs=tolerance)
+            assert [found.log_low, found.log_high] == pytest.approx(expected, abs=tolerance)
 
 
 def test_relaxation_and_a_sweep_are_fitted_together() -> None:

@@ -22,6 +22,7 @@ from biogrip.judging.doubts import (
     has_fast_noise,
 )
 from biogrip.judging.likelihood import Likelihood, make_likelihood
+from biogrip.judging.whiteness import as_correlated
 from biogrip.library import identify_trace
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.noise import AR1, Noise, Outliers, add_noise
@@ -140,7 +141,10 @@ def test_fast_noise_is_neither_smooth_nor_in_one_place() -> None:
     most = np.sqrt(0.45 / 0.55 * np.sum(fast[20:] ** 2) / np.sum(fast[:20] ** 2))
     burst = fast * np.where(time_s < 20, most, 1.0)
     smooth = 20 * np.sin(2 * np.pi * time_s / 10) + rng.standard_normal(400)
-    found = [has_fast_noise(residuals, it, np.ones((1, 400))) for it in (fast, burst, smooth)]
+    basis = np.full((1, 400), 400**-0.5)
+    worth = [as_correlated(it - np.mean(it), basis)[0] for it in (fast, burst, smooth)]
+    pairs = zip((fast, burst, smooth), worth, strict=True)
+    found = [has_fast_noise(residuals, *pair) for pair in pairs]
     assert found == [True, False, False]
 
 

@@ -7,9 +7,8 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import fit_from
-from biogrip.judging.doubts import Note
+from biogrip.judging.doubts import Note, notes_on_gains
 from biogrip.judging.likelihood import make_likelihood
-from biogrip.judging.linearity import notes_on_gains
 from biogrip.library import Sample, set_up
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.protocol import hold

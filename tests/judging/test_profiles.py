@@ -9,15 +9,16 @@ import pytest
 from biogrip.arrays import Array, IntArray
 from biogrip.fit.least_squares import FINE, Normal
 from biogrip.fit.trace_fit import TraceFit
-from biogrip.judging.constrained_fits import ConstrainedFits, QuantityConstraint
 from biogrip.judging.diagnosis import diagnose
 from biogrip.judging.doubts import DOUBT, RING, Note
 from biogrip.judging.likelihood import Likelihood, Quantity, find_combinations, parameters_and_sum
 from biogrip.judging.onset import _at, profile_over_onset
 from biogrip.judging.profiles import (
     DETERMINED,
+    ConstrainedFits,
     Finding,
     Points,
+    QuantityConstraint,
     _find_crossings,
     compute_findings,
     find_gaps,

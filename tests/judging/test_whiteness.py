@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 from scipy.stats import beta
-from scipy.stats import f as fisher
 from scipy.stats import t as student
 
 from biogrip.arrays import Array
@@ -156,26 +155,20 @@ def relaxation(times: Array) -> tuple[Array, Array]:
     return 100 + 80 * decay, absorbed(slopes)
 
 
-@pytest.mark.parametrize("readings", [8, 20, 100, 400])
+@pytest.mark.parametrize("readings", [8, 20, 100])
 @pytest.mark.parametrize("decades", [0, 4])
-def test_of_white_noise_both_tests_fail_as_often_as_they_say(
-    readings: int, decades: int, monkeypatch: pytest.MonkeyPatch
+def test_white_noise_has_a_step_at_most_as_often_as_the_test_says(
+    readings: int, decades: int
 ) -> None:
-    """Within four standard deviations of 1 % of 2,000 traces, 0.9 %, and an error of a fifth."""
+    """Of 1,000 traces 1 %, within four standard deviations; and not hardly ever."""
     even = 100 * np.arange(1, readings + 1) / readings
     times = np.geomspace(100 * 10.0**-decades, 100, readings) if decades else even
     _, basis = relaxation(times)
-    steps = whiteness.steps_of(basis, np.asarray)
-    apart = whiteness.parts_apart(basis, readings // 2)
-    monkeypatch.setattr(whiteness, "parts_apart", lambda *_: apart)
-    noise = np.random.default_rng(readings + decades).standard_normal((2000, readings))
+    noise = np.random.default_rng(readings + decades).standard_normal((1000, readings))
     left = noise - noise @ basis.T @ basis
-    most = [np.max(steps.along(own) ** 2) / np.sum(own**2) for own in left]
-    of_steps = [steps.chance(float(own)) for own in most]
-    chances = np.array(
-        [of_steps, [whiteness.compare_halves(own, basis, readings // 2) for own in left]]
-    )
-    assert np.mean(chances < LEVEL, axis=1) == pytest.approx(LEVEL, abs=0.011)
+    steps = [whiteness.find_step(own, basis, np.asarray) for own in left]
+    alarms = np.mean([step is not None and step.chance < LEVEL for step in steps])
+    assert 0.002 <= alarms <= LEVEL + 0.0126
 
 
 def test_a_step_is_what_a_fit_with_it_finds() -> None:
@@ -191,76 +184,18 @@ def test_a_step_is_what_a_fit_with_it_finds() -> None:
     amplitudes = np.linalg.lstsq(design, trace, rcond=None)[0]
     assert found.size == pytest.approx(amplitudes[-1])
     assert found.left == pytest.approx(trace - design @ amplitudes, abs=1e-9)
-    assert 24 not in whiteness.steps_of(absorbed(np.vstack((basis, step))), np.asarray).before
+    absorbing = absorbed(np.vstack((basis, step)))
+    other = whiteness.find_step(trace - trace @ absorbing.T @ absorbing, absorbing, np.asarray)
+    assert other
+    assert other.before != 24
 
 
-def test_halves_are_compared_as_chow_does() -> None:
-    """The F test of one fit against two, each with parameters of its own."""
-    times = np.arange(1, 61.0)
-    true, basis = relaxation(times)
-    trace = true * np.where(times > 25, 0.99, 1.0) + np.random.default_rng(1).standard_normal(60)
-
-    def squares(some: slice) -> float:
-        return float(np.linalg.lstsq(basis[:, some].T, trace[some], rcond=None)[1][0])
-
-    apart = squares(slice(25)) + squares(slice(25, None))
-    ratio = (squares(slice(None)) - apart) / 3 / (apart / 54)
-    chance = whiteness.compare_halves(trace - trace @ basis.T @ basis, basis, 25)
-    assert chance == pytest.approx(fisher.sf(ratio, 3, 54), rel=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [("jump", "change at about 50.5 s"), ("rate", "each fitted by itself, differ")],
-)
-def test_what_changed_is_said(change: str, said: str) -> None:
-    """A jump of three noises; a sample that relaxes twice as fast from 50 s on."""
+def test_what_changed_is_said() -> None:
+    """A jump of three noises."""
     times = np.arange(1, 101.0)
     true, _ = relaxation(times)
-    faster = 100 + 80 * np.exp(-2.5 - (times - 50) / 9)
-    wrong = {"jump": np.full(100, 3.6), "rate": faster - true}[change]
-    readings = true + np.where(times > 50, wrong, 0)
+    readings = true + np.where(times > 50, 3.6, 0)
     readings += 1.2 * np.random.default_rng(13).standard_normal(100)
     found = told(times, readings, reads="modulus", model="zener_maxwell")
     assert found.status == DOUBTFUL
-    assert said in str(found)
-
-
-def test_white_noise_has_a_line_as_often_as_its_level_says() -> None:
-    """Fisher's chance is exact: within four standard deviations of 2 % of 2,000 traces, 1.3 %."""
-    rng, times = np.random.default_rng(0), np.arange(100.0)
-    found = [whiteness.find_line(rng.standard_normal(100), times) for _ in range(2000)]
-    # The ten lowest of 49 frequencies are not looked at.
-    alarms = np.mean([chance < 0.02 for _, chance, _ in found])
-    assert alarms == pytest.approx(0.02 * 40 / 49, abs=0.012)
-
-
-@pytest.mark.parametrize("frequency", [7.0, 7.03, 21.4])
-def test_a_line_has_the_frequency_and_amplitude_of_its_sine(frequency: float) -> None:
-    """The bound of a frequency is sqrt(6/n) sd / (pi amplitude T), 0.0008 Hz."""
-    times = np.arange(2000) / 100
-    sine = 1.5 * np.sin(2 * np.pi * frequency * times + 1)
-    noise = np.random.default_rng(1).standard_normal(2000)
-    found, chance, basis = whiteness.find_line(sine + noise, times)
-    assert found == pytest.approx(frequency, abs=0.003)
-    assert chance < 1e-9
-    along = basis @ (sine + noise)
-    assert np.linalg.norm(along) * np.sqrt(2 / 2000) == pytest.approx(1.5, abs=4 * np.sqrt(1e-3))
-    assert np.std(sine + noise - along @ basis) == pytest.approx(1, rel=0.1)
-    assert whiteness.find_line(sine + noise, times**1.1)[1] == 1
-
-
-def test_hum_is_named_with_its_harmonic_and_counts_no_residual_twice() -> None:
-    """50 Hz of five times the noise and 150 Hz of twice; the limits of the others' noise hold."""
-    times = np.arange(1, 2001) / 1000
-    hum = 0.05 * np.sin(2 * np.pi * 50 * times) + 0.02 * np.sin(2 * np.pi * 150 * times + 1)
-    readings = 1 - 0.5 * np.exp(-times / 0.7) + hum
-    readings += 0.01 * np.random.default_rng(2).standard_normal(len(times))
-    found = told(times, readings, reads="compliance", model="zener_kelvin")
-    assert found.status == DOUBTFUL
-    assert "a line in its spectrum, at 50 Hz (0.05" in found.data["reasons"][0]
-    assert " and 150 Hz (0.02" in found.data["reasons"][0]
-    assert "average the readings over 0.02 s" in found.data["reasons"][0]
-    assert "independent ones" not in str(found)
-    limits = found.to_frame().loc[["k_s", "k_v", "tau_v"]]
-    assert np.all((limits["low"] < [2, 2, 0.7]) & (limits["high"] > [2, 2, 0.7]))
+    assert "change at about 50.5 s" in str(found)

@@ -16,8 +16,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocato
 
 from biogrip.digits import plain, with_limits, with_unit
 from biogrip.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, figure, literal
-from biogrip.judging.cells import Cell, Compared, no_longer_log
-from biogrip.judging.censored import ABOVE, BELOW, KNOWN
+from biogrip.judging.cells import ABOVE, BELOW, KNOWN, Cell, Compared, no_longer_log
 from biogrip.terminal import visible
 
 ONE_COLUMN_IN = 85 / 25.4

@@ -108,8 +108,7 @@ class Experiment:
             time_s, loads = self.record.T
             if self.tip_power is not None:
                 loads = in_contact(loads, self.tip_power, self.deeper)
-            course = follow_rows(time_s, loads, deforms=self.instrument.deforms)
-            return replace(course, smoothed=self.load_errors is not None)
+            return follow_rows(time_s, loads, deforms=self.instrument.deforms)
         return join_phases(self.phases, deforms=self.instrument.deforms)
 
     @cached_property

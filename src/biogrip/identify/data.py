@@ -8,8 +8,7 @@ import numpy as np
 from biogrip.digits import counted, plain, round_increase
 from biogrip.fit.experiment import Experiment
 from biogrip.judging.diagnosis import Diagnosis
-from biogrip.judging.doubts import REJECTED, REJECTION, find_reasons, order_notes
-from biogrip.judging.linearity import NOT_LINEAR
+from biogrip.judging.doubts import NOT_LINEAR, REJECTED, REJECTION, find_reasons, order_notes
 from biogrip.judging.profiles import FIT_REJECTED, Finding
 from biogrip.physics.noise import within
 from biogrip.physics.response import simulated_response

@@ -37,9 +37,8 @@ from biogrip.fit.trace_fit import TraceFit, fit_least_squares
 from biogrip.fit.trace_noise import absorbed, compare_extremes, growth_left
 from biogrip.identify.prepare import Trace, flow_of, for_trace, prepare
 from biogrip.judging.diagnosis import Diagnosis, diagnose, diagnose_all, with_times
-from biogrip.judging.doubts import DOUBT, HARMLESS, REJECTED, REJECTION, Note
+from biogrip.judging.doubts import DOUBT, HARMLESS, REJECTED, REJECTION, Note, notes_on_gains
 from biogrip.judging.likelihood import compute_fall, make_likelihood
-from biogrip.judging.linearity import notes_on_gains
 from biogrip.judging.onset import OnsetFits, notes_on_start, profile_over_onset
 from biogrip.judging.profiles import Finding
 from biogrip.physics.fractional import LONGEST_S, SHORTEST_S

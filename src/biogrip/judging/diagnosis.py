@@ -18,7 +18,6 @@ from functools import cached_property, partial
 import numpy as np
 
 import biogrip.levels as levels
-from biogrip.arrays import Array
 from biogrip.digits import plain
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import fit_from, refit
@@ -64,8 +63,6 @@ class Diagnosis:
     """A verdict on every parameter and on the sum of the exchangeable ones."""
     trades: list[Trade] = field(default_factory=list)
     """Parameters of which only a combination is determined."""
-    lowest: Array | None = None
-    """Log-parameters at which profiles come below the best fit."""
     converged: bool = True
     """False if the best fit has not converged."""
     grip: Grip | None = None
@@ -153,7 +150,7 @@ def profile_all(likelihoods: Sequence[Likelihood]) -> list[Diagnosis]:
     model = likelihoods[0].problem.residuals.model
     every = compute_findings(likelihoods, parameters_and_sum(model))
     trades = map(find_trade_offs, likelihoods, every)
-    return list(map(profiled, likelihoods, every, trades))
+    return list(map(Diagnosis, likelihoods, every, trades))
 
 
 def settled(
@@ -198,19 +195,13 @@ def settled(
 
 def lower_fit(judged: Diagnosis, fit: Fit) -> Fit | None:
     """Return the fit from the lowest point of the profiles, if it is below the best fit."""
-    exact = levels.EXACT * judged.likelihood.problem.residuals.peak
-    if judged.lowest is None or fit.misfit < exact:
-        return None
-    missed = refit(fit, judged.likelihood.problem, judged.lowest)
-    return None if judged.likelihood.increase(missed.misfit) > -levels.MISSED else missed
-
-
-def profiled(likelihood: Likelihood, findings: list[Finding], trades: list[Trade]) -> Diagnosis:
-    """Return a diagnosis without notes, with the lowest point of its profiles."""
-    every = [*findings, *(trade.finding for trade in trades)]
+    every = [*judged.findings, *(trade.finding for trade in judged.trades)]
     lowest = min(every, key=lambda finding: float(finding.increases.min()))
-    missed = lowest.lowest if lowest.increases.min() < -levels.MISSED else None
-    return Diagnosis(likelihood, findings, trades, lowest=missed)
+    exact = levels.EXACT * judged.likelihood.problem.residuals.peak
+    if lowest.increases.min() >= -levels.MISSED or fit.misfit < exact:
+        return None
+    missed = refit(fit, judged.likelihood.problem, lowest.lowest)
+    return None if judged.likelihood.increase(missed.misfit) > -levels.MISSED else missed
 
 
 def with_times(diagnoses: Sequence[Diagnosis]) -> list[Diagnosis]:
@@ -303,15 +294,9 @@ def _ringing(judged: Diagnosis, *, rejected: bool) -> Iterator[Note]:
             REJECTION if rejected else DOUBT,
             "The arms ring: their inertia, which fits leave out, changes readings of this sample "
             f"by up to {plain(ring.largest, 2)} times the noise. Leave out the readings of the "
-            f"first {_rounded_up(1e3 * ring.lasts_s)} ms after each change of the torque.",
+            f"first {np.ceil(1e3 * ring.lasts_s):.0f} ms after each change of the torque.",
             RING,
         )
-
-
-def _rounded_up(value: float) -> str:
-    """Return a number of two digits that is not below the value."""
-    unit = 10.0 ** (np.floor(np.log10(value)) - 1) if value > 0 else 1.0
-    return f"{unit * np.ceil(value / unit * (1 - 1e-9)):.6g}"
 
 
 def _pulling(grip: Grip | None, last_s: float) -> Iterator[Note]:

@@ -2,7 +2,7 @@
 
 The heaviest note decides the status of a fit: ok, doubtful or rejected (`compute_status`).
 Residuals are tested for white noise (`biogrip.judging.whiteness`), each test at the level
-`FALSE_ALARM`. A line or a step that explains the others is named in their place. Noise that grows
+`FALSE_ALARM`. A step that explains the others is named in their place. Noise that grows
 with the rotation is told first, and the other tests are of what it leaves.
 
 What is correlated beyond chance (`CERTAIN_MISFIT`) and larger than the scatter of neighbouring
@@ -10,22 +10,25 @@ readings may be noise all the same, if it is correlated for a short time (`has_f
 is misfit. A misfit of 2 % of the peak or more rejects the fit. With a smaller one limits count
 independent residuals only: the fit is good to so much of the peak, which is doubtful, not wrong. A
 noise model that is correlated for too long may be misfit, too (`find_slow_misfit`).
+
+What is read is the sum of what each level that was held causes. Of a linear sample all have one
+gain, which its stiffnesses take; of one that stiffens or softens, each level has its own, which one
+test tells (`notes_on_gains`).
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
-from scipy.special import chdtr, chdtrc
+from scipy.special import chdtr, chdtrc, fdtrc, stdtrit
 
 import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray
-from biogrip.digits import counted, p_value, plain
+from biogrip.digits import counted, p_value, plain, with_limits
 from biogrip.fit.any_sample import fit_any_sample
 from biogrip.fit.trace_noise import (
     NoiseModel,
-    NoiseModelLikelihood,
     absorbed,
     compare_extremes,
     compute_growth,
@@ -33,7 +36,8 @@ from biogrip.fit.trace_noise import (
 )
 from biogrip.judging import whiteness
 from biogrip.judging.likelihood import Likelihood
-from biogrip.physics.noise import MOST_SAMPLES, ROOT_12, estimate_noise, without
+from biogrip.physics.noise import ROOT_12, estimate_noise, without
+from biogrip.physics.protocol import Course, superposed
 from biogrip.physics.residuals import Residuals
 
 HARMLESS, DOUBT, REJECTION = "harmless", "doubt", "rejection"
@@ -42,7 +46,7 @@ HARMLESS, DOUBT, REJECTION = "harmless", "doubt", "rejection"
 OK, DOUBTFUL, REJECTED = "ok", "doubtful", "rejected"
 """Status of a fit by the heaviest of its notes."""
 
-ROUNDED, RING = "rounded", "ring"
+ROUNDED, RING, NOT_LINEAR = "rounded", "ring", "not linear"
 """What notes are about that others depend on."""
 
 _STATUS = {HARMLESS: OK, DOUBT: DOUBTFUL, REJECTION: REJECTED}
@@ -58,7 +62,7 @@ class Note:
     text: str
     """The sentence."""
     about: str = ""
-    """`ROUNDED`, `RING` or `biogrip.judging.linearity.NOT_LINEAR`, if it is about that."""
+    """`ROUNDED`, `RING` or `NOT_LINEAR`, if it is about that."""
 
 
 def compute_status(notes: Sequence[Note]) -> str:
@@ -80,8 +84,8 @@ def find_reasons(notes: Sequence[Note]) -> list[str]:
 
 # Of more readings no basis is formed: what a fit absorbs of so many is nothing.
 MANY = 100_000
-# Most outliers that are named, and lines of a spectrum.
-_NAMED, _MOST_LINES = 5, 3
+# Most outliers that are named.
+_NAMED = 5
 
 
 FindNotes = Callable[[], list[Note]]
@@ -113,34 +117,6 @@ class _Left:
     def correlation(self) -> tuple[float, float]:
         """Correlation of neighbours, and its chance."""
         return whiteness.correlated(self.bulk, self.basis)
-
-    @cached_property
-    def lines(self) -> list[str]:
-        """Sentence on lines in the spectrum, if there is no other misfit.
-
-        Outliers have all frequencies, and sweeps none. What a smoothed load leaves has its own.
-        """
-        residuals = self.likelihood.problem.residuals
-        if residuals.course.sweeps or residuals.course.smoothed or self.struck.any():
-            return []
-        rest, taken, named = self.bulk, self.basis, list[str]()
-        unit, slowest = f" {residuals.instrument.read.unit}".rstrip(), np.inf
-        while len(named) < _MOST_LINES:
-            frequency, chance, line = whiteness.find_line(rest, residuals.trace.time_s)
-            if chance >= levels.FALSE_ALARM:
-                break
-            amplitude = float(np.linalg.norm(line @ rest)) * np.sqrt(2 / len(rest))
-            named.append(f"{plain(frequency, 3)} Hz ({plain(amplitude, 2)}{unit})")
-            slowest = min(slowest, frequency)
-            taken = absorbed(np.vstack((taken, line)))
-            rest = without(taken, self.bulk)
-        large = float(np.sqrt(np.mean(rest**2))) > levels.TOO_MUCH * self.scale
-        if not named or (large and whiteness.correlated(rest, taken)[1] < levels.CERTAIN_MISFIT):
-            return []
-        return [
-            f"The residual has a line in its spectrum, at {' and '.join(named)}, as of hum or a "
-            f"vibration. Filter it out, or average the readings over {plain(1 / slowest, 3)} s."
-        ]
 
 
 def examine_residuals(likelihood: Likelihood) -> tuple[Likelihood, FindNotes]:
@@ -177,8 +153,8 @@ def examine_residuals(likelihood: Likelihood) -> tuple[Likelihood, FindNotes]:
     left = _Left(likelihood, growth, struck, standard[~struck], basis, scale)
     certain = left.correlation[1] < levels.CERTAIN_MISFIT and left.times > levels.TOO_MUCH
     found, worth, find_notes = None, None, _find_notes
-    if certain and not left.lines:
-        found, worth = _misfit(left, residual, slopes)
+    if certain:
+        found, worth = _misfit(left, residual)
     small = misfit <= levels.TOO_MUCH * rounding / ROOT_12 and np.max(np.abs(residual)) <= rounding
     small &= not residuals.course.sweeps and not residuals.coloured
     if small and likelihood.freedom < np.inf:
@@ -210,7 +186,7 @@ def _find_notes(left: _Left, misfit: Note | None = None) -> list[Note]:
         colour = list(_about_colour(left))
         changes = _about_changes(left, coloured=bool(colour))
         # The misfit is said once.
-        doubts += left.lines or changes[-1:] if misfit else left.lines or changes or colour
+        doubts += changes[-1:] if misfit else changes or colour
     notes += (Note(DOUBT, doubt) for doubt in doubts)
     if notes and in_time and not residuals.coloured and compute_status(notes) == DOUBTFUL:
         how = "If the set-up is right, measurement.noise_model: coloured, or --noise-model coloured"
@@ -230,7 +206,7 @@ def _find_notes_of_rounding(left: _Left, misfit: Note | None = None) -> list[Not
     return [Note(HARMLESS if status == OK else DOUBT, text, ROUNDED)]
 
 
-def _misfit(left: _Left, residual: Array, slopes: Array) -> tuple[Note, tuple[float, float] | None]:
+def _misfit(left: _Left, residual: Array) -> tuple[Note, tuple[float, float] | None]:
     """Return the note on a misfit, and its worth and freedom if limits allow for it."""
     residuals, times, scale = left.likelihood.problem.residuals, left.times, left.scale
     more = plain(times, 2)
@@ -238,7 +214,8 @@ def _misfit(left: _Left, residual: Array, slopes: Array) -> tuple[Note, tuple[fl
     relative = residuals.course.sweeps and residuals.coloured
     of_peak = f"{plain(100 * share, 2)} % of the {'moduli' if relative else 'peak'}"
     suspects = name_suspects(residuals, times, scale)
-    if not residuals.course.sweeps and has_fast_noise(residuals, residual, slopes):
+    misfit = whiteness.as_correlated(left.bulk, left.basis)
+    if not residuals.course.sweeps and has_fast_noise(residuals, residual, misfit[0]):
         text = (
             f"The RMS residual is {more} times the noise of neighbouring readings, as of noise "
             "that is correlated for a short time."
@@ -253,7 +230,6 @@ def _misfit(left: _Left, residual: Array, slopes: Array) -> tuple[Note, tuple[fl
             f"The RMS residual is {more} times the noise of the trace, and {of_peak}: {suspects}."
         )
         return Note(REJECTION, text), None
-    misfit = whiteness.as_correlated(left.bulk, left.basis)
     if misfit[0] < 1:
         slow = "broad as the sweep" if residuals.course.sweeps else "slow as the trace"
         text += f" It is as {slow}, which the limits allow for."
@@ -333,45 +309,27 @@ def _about_changes(left: _Left, *, coloured: bool) -> list[str]:
         is_inertia, cause = whiteness.find_inertia(residuals, residual, basis, growth)
         return [f"The fit leaves what is of {cause}."] if is_inertia and not coloured else []
     step = whiteness.find_step(residual, basis, lambda it: trace.condensed.cleared(it) / growth)
-    if step and step.chance < levels.FALSE_ALARM and not (coloured and _is_coloured(step)):
-        before_s, after_s = trace.time_s[step.before - 1 : step.before + 1]
-        size = f"{plain(-step.size, 2)} {residuals.instrument.read.unit}".rstrip()
-        what = f"readings change at about {plain(0.5 * (before_s + after_s))} s"
-        away = "what is before or after (--from, --until)"
-        if step.before == 1:
-            what = f"first reading ({plain(before_s)} s) does not fit the rest"
-            away = "that reading (--from)"
-        by = f"as by a step of {size}: white noise hardly does that ({p_value(step.chance)})"
-        said = [f"The {what}, {by}, and the values may be far off. Leave out {away}."]
-        if left.times > levels.CLEARLY:
-            least = plain(fit_any_sample(residuals).sd / left.scale, 2)
-            rms = f"The RMS residual is {plain(left.times, 2)} times the noise of the trace"
-            said.insert(0, f"{rms}; the closest linear sample leaves {least} times the noise.")
-        return said
-    split = middle_of(residuals)
-    chance = 1.0 if coloured else whiteness.compare_halves(residual, basis, split)
-    if chance >= levels.FALSE_ALARM:
+    if step is None or step.chance >= levels.FALSE_ALARM:
         return []
-    return [
-        f"The readings up to {plain(trace.time_s[split - 1])} s and those after it, each fitted "
-        f"by itself, differ by more than white noise ({p_value(chance)}): the sample, the "
-        "instrument or the protocol changed, and the values may be far off."
-    ]
-
-
-def _is_coloured(step: whiteness.Step) -> bool:
-    """Return True if what a fit leaves with a step is not white noise, either."""
-    given = step.left, step.basis
-    chance = min(whiteness.correlated(*given)[1], whiteness.wandering(*given))
-    return chance < levels.FALSE_ALARM
-
-
-def middle_of(residuals: Residuals) -> int:
-    """Return the reading at which phases part a trace, or the middle one."""
-    count = residuals.samples
-    starts = np.searchsorted(residuals.trace.time_s, residuals.course.changes_s)
-    nearest = int(starts[np.argmin(np.abs(starts - count // 2))]) if len(starts) else 0
-    return nearest if count // 4 <= nearest <= count - count // 4 else count // 2
+    # What a fit with a step leaves has to be white noise, if what it leaves without one is not.
+    rest = step.left, step.basis
+    chance = min(whiteness.correlated(*rest)[1], whiteness.wandering(*rest)) if coloured else 1.0
+    if chance < levels.FALSE_ALARM:
+        return []
+    before_s, after_s = trace.time_s[step.before - 1 : step.before + 1]
+    size = f"{plain(-step.size, 2)} {residuals.instrument.read.unit}".rstrip()
+    what = f"readings change at about {plain(0.5 * (before_s + after_s))} s"
+    away = "what is before or after (--from, --until)"
+    if step.before == 1:
+        what = f"first reading ({plain(before_s)} s) does not fit the rest"
+        away = "that reading (--from)"
+    by = f"as by a step of {size}: white noise hardly does that ({p_value(step.chance)})"
+    said = [f"The {what}, {by}, and the values may be far off. Leave out {away}."]
+    if left.times > levels.CLEARLY:
+        least = plain(fit_any_sample(residuals).sd / left.scale, 2)
+        rms = f"The RMS residual is {plain(left.times, 2)} times the noise of the trace"
+        said.insert(0, f"{rms}; the closest linear sample leaves {least} times the noise.")
+    return said
 
 
 def _about_outliers(residuals: Residuals, struck: BoolArray) -> Iterator[str]:
@@ -446,22 +404,106 @@ def find_slow_misfit(
     )
 
 
-def has_fast_noise(residuals: Residuals, residual: Array, slopes: Array) -> bool:
+def has_fast_noise(residuals: Residuals, residual: Array, independent: float) -> bool:
     """Return True if what a fit leaves is stationary noise that is correlated for a short time.
 
-    Slopes are (n_parameters, n_samples). Of more than `MOST_SAMPLES` readings, or white ones, it is
-    not.
+    It counts as so many independent residuals: see `whiteness.as_correlated`.
     """
-    time_s = residuals.trace.time_s
-    if residuals.coloured or len(time_s) > MOST_SAMPLES:
-        return False
     stretches = np.array_split(np.square(residual), min(_SLOW_STRETCHES, len(residual)))
     largest = max(float(np.sum(stretch)) for stretch in stretches)
-    if largest > levels.IN_ONE_STRETCH * float(residual @ residual):
-        return False
-    noise_model = NoiseModelLikelihood(time_s, residual, slopes).best()
-    fast = noise_model.time_s <= levels.SLOW * residuals.duration_s
+    stationary = largest <= levels.IN_ONE_STRETCH * float(residual @ residual)
     # Neighbours of such noise differ by a root of its readings less than all of it scatters.
     scatter = np.sqrt(np.mean(residual**2)) / max(residuals.noise_scale, 1e-300)
-    rough = scatter < levels.SMOOTH * np.sqrt(max(levels.SLOW * len(time_s), 1.0))
-    return fast and bool(rough) and noise_model.ar1 > levels.NOTICEABLE
+    rough = scatter < levels.SMOOTH * np.sqrt(max(levels.SLOW * len(residual), 1.0))
+    fast = independent > 0.5 / levels.SLOW
+    return stationary and bool(rough) and fast and not residuals.coloured
+
+
+# Most levels of which gains are told; steps with which gains settle.
+_MOST_LEVELS, _STEPS = 10, 8
+
+
+def held_levels(course: Course) -> list[tuple[float, Course]]:
+    """Return the levels at which a load is held, ascending in size, and the protocol of each alone.
+
+    Levels are one that differ by less than a tenth, and none below a tenth of the largest.
+    """
+    ends_s = np.append(course.time_s[1:], course.end_s)
+    heights = np.where(np.any(course.within_phases[:, 1:], axis=1), 0.0, course.within_phases[:, 0])
+    order = np.argsort(np.abs(heights), kind="stable")
+    order = order[np.abs(heights[order]) > levels.HELD * np.abs(heights).max(initial=0.0)]
+    starts = [0]
+    for place, phase in enumerate(order.tolist()):
+        if abs(heights[phase] - heights[order[starts[-1]]]) >= levels.HELD * abs(heights[phase]):
+            starts.append(place)
+    groups = np.split(order, starts[1:]) if len(order) else []
+    found = []
+    for group in groups:
+        starts_s = np.concatenate((course.time_s[group], ends_s[group]))
+        changes = np.zeros((len(starts_s), 3))
+        changes[:, 0] = np.concatenate((heights[group], -heights[group]))
+        own = superposed(starts_s, changes, course.end_s, deforms=course.deforms)
+        found.append((float(np.mean(heights[group])), own))
+    return found
+
+
+def notes_on_gains(likelihood: Likelihood, notes: list[Note]) -> Iterator[Note]:
+    """Yield a note if gains of levels differ, by an F test; others say if the fit is rejected."""
+    residuals = likelihood.problem.residuals
+    if residuals.course.sweeps or residuals.samples > MANY:
+        return
+    held = held_levels(residuals.course)
+    if not 1 < len(held) <= _MOST_LEVELS:
+        return
+    found = _gains(likelihood, [replace(residuals, course=course) for _, course in held[1:]])
+    if found is None:
+        return
+    gains, errors, chance = found
+    instrument = residuals.instrument
+    unit = f" {instrument.controlled.unit}".rstrip()
+    said = " and ".join(
+        f"at {plain(level)}{unit} is {with_limits(gain, gain - error, gain + error)}"
+        for (level, _), gain, error in zip(held[1:], gains, errors, strict=True)
+    )
+    yield Note(
+        REJECTION if compute_status(notes) == REJECTED else DOUBT,
+        f"{instrument.read.title.capitalize()} per {instrument.controlled.name} {said} of that "
+        f"at {plain(held[0][0])}{unit} ({p_value(chance)}): the sample is not linear.",
+        NOT_LINEAR,
+    )
+
+
+def _gains(
+    likelihood: Likelihood, levels_alone: list[Residuals]
+) -> tuple[Array, Array, float] | None:
+    """Fit gains over that of the first level, and the sample along, by steps of Gauss-Newton.
+
+    Returns the gains, (n_levels - 1,), half widths of their limits, and the chance of as much if
+    the sample is linear; None if it may be.
+    """
+    residuals, best = likelihood.problem.residuals, likelihood.best.copy()
+    condensed, gains, chance = residuals.trace.condensed, np.ones(len(levels_alone)), 1.0
+    for step in range(_STEPS):
+        left, slopes = residuals(best)
+        shown = condensed.cleared(np.array([level.simulated(best) for level in levels_alone]))
+        left = left + (gains - 1) @ shown[:, 0]
+        slopes = slopes + np.tensordot(gains - 1, shown[:, 1:], 1)
+        basis = absorbed(np.vstack((slopes, condensed.taken)))
+        alone, rest = without(basis, shown[:, 0]), without(basis, left)
+        free = len(rest) - len(basis) - len(alone)
+        if free < 1:
+            return None
+        more = np.asarray(np.linalg.lstsq(alone.T, -rest)[0], np.float64)
+        after = rest + more @ alone
+        square = float(after @ after) / free
+        if not step:
+            explained = float(rest @ rest - after @ after)
+            chance = float(fdtrc(len(alone), free, explained / len(alone) / square))
+            if chance >= levels.FALSE_ALARM:
+                return None
+        more = np.clip(more, -0.5, 0.5)
+        gains += more
+        best += np.clip(np.linalg.lstsq(slopes.T, -left - more @ shown[:, 0])[0], -1.0, 1.0)
+    room = stdtrit(free, 0.5 + likelihood.confidence / 2)
+    errors = room * np.sqrt(square * np.diagonal(np.linalg.pinv(alone @ alone.T)))
+    return gains, errors, chance

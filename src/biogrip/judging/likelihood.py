@@ -159,7 +159,7 @@ def parameters_and_sum(model: SampleModel) -> list[Quantity]:
     if len(exchangeable) < 2:
         return single
     within = tuple(BranchPenalty(branch) for branch in model.free_branches)
-    return [*single, replace(_sum_of(model, exchangeable), penalties=within)]
+    return [*single, replace(_combined(model, exchangeable), penalties=within)]
 
 
 def characteristic_times(model: SampleModel) -> list[Quantity]:
@@ -195,11 +195,12 @@ def find_combinations(model: SampleModel, members: list[int]) -> list[Quantity]:
         if not {first.kind, second.kind} <= {"stiffness", "damping"}:
             continue
         if first.kind == second.kind:
-            combined += [_sum_of(model, (a, b)), _series_combination(model, (a, b))]
+            combined += [_combined(model, (a, b)), _combined(model, (a, b), -1)]
         else:
-            pair = (a, b) if first.kind == "damping" else (b, a)
-            names, symbols, _ = _names_of(model, pair)
-            combined.append(Quantity("/".join(names), "/".join(symbols), "s", pair, sign=(1, -1)))
+            c, k = (first, second) if first.kind == "damping" else (second, first)
+            pair = (a, b) if c is first else (b, a)
+            label, symbol = f"{c.name}/{k.name}", f"{c.symbol}/{k.symbol}"
+            combined.append(Quantity(label, symbol, "s", pair, sign=(1, -1)))
     return [replace(quantity, penalties=ordered) for quantity in combined]
 
 
@@ -208,21 +209,17 @@ def _ordered(model: SampleModel) -> tuple[BranchPenalty, ...]:
     return tuple(BranchPenalty(branch, later, model.branch_power) for branch, later in pairs)
 
 
-def _sum_of(model: SampleModel, members: tuple[int, ...]) -> Quantity:
-    names, symbols, unit = _names_of(model, members)
-    return Quantity(" + ".join(names), " + ".join(symbols), unit, members, 1)
-
-
-def _series_combination(model: SampleModel, members: tuple[int, ...]) -> Quantity:
-    names, symbols, unit = _names_of(model, members)
-    label, symbol = (" + ".join(f"1/{text}" for text in texts) for texts in (names, symbols))
-    return Quantity(f"1/({label})", f"$1/($ {symbol} $)$", unit, members, -1)
-
-
-def _names_of(model: SampleModel, members: tuple[int, ...]) -> tuple[list[str], list[str], str]:
-    """Return the names and symbols of parameters, and the unit of the first."""
+def _combined(model: SampleModel, members: tuple[int, ...], sense: int = 1) -> Quantity:
+    """Return the sum of parameters, or with a sense of -1 what they are in series."""
     chosen = [model.parameters[index] for index in members]
-    return [p.name for p in chosen], [p.symbol for p in chosen], chosen[0].unit
+    inverse = "1/" if sense < 0 else ""
+    label, symbol = (
+        " + ".join(f"{inverse}{name}" for name in names)
+        for names in ([p.name for p in chosen], [p.symbol for p in chosen])
+    )
+    if sense < 0:
+        label, symbol = f"1/({label})", f"$1/($ {symbol} $)$"
+    return Quantity(label, symbol, chosen[0].unit, members, sense)
 
 
 def quantity_value(quantity: str, parameters: Mapping[str, float]) -> float | None:

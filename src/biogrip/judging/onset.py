@@ -23,9 +23,9 @@ import numpy as np
 from scipy.special import chdtri
 
 import biogrip.levels as levels
-from biogrip.arrays import Array, IntArray, parts
+from biogrip.arrays import Array, IntArray
 from biogrip.digits import instant, plain
-from biogrip.fit.any_sample import fit_any_sample, fit_responses, spread_lags
+from biogrip.fit.any_sample import fit_responses, spread_lags
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import LeastSquaresSettings, fit_from, identify_many
 from biogrip.fit.problem import TraceProblem, silent
@@ -47,8 +47,6 @@ _LAGS_A_DECADE = 2
 _DELAYS = 65
 # Most readings that an estimate takes of the whole trace, and as many of what the grid spans.
 _MOST_READINGS = 2000
-# Numbers formed together, which should fit a processor's cache.
-_NUMBERS_AT_ONCE = 400_000
 # Least share of the protocol that has to be after the onset.
 _LEAST_AFTER = 0.02
 # Readings after the latest onset, beside one for each parameter.
@@ -84,14 +82,12 @@ def _estimate(
     shortest = float(np.min(np.diff(time_s)))
     lags = spread_lags(torque, time_s, _LAGS_A_DECADE)
 
-    def square_sums(onsets_s: Array, some: IntArray) -> list[float]:
-        nuisance = nuisance_basis(time_s[some], offset=offset, drift=problem.drift)
-        trace, sums = without(nuisance, readings[some]), list[float]()
-        for few in parts(len(onsets_s), max(1, _NUMBERS_AT_ONCE // (len(lags) * len(some)))):
-            # All at once: one call costs more than its numbers.
-            every, place = np.unique(time_s[some] - onsets_s[few, None], return_inverse=True)
-            shown, place = lag_course(torque, lags, every), place.reshape(-1, len(some))
-            sums += [fit_responses(trace, without(nuisance, shown[:, own]))[1] for own in place]
+    def square_sums(onsets_s: Array, chosen: IntArray) -> list[float]:
+        nuisance = nuisance_basis(time_s[chosen], offset=offset, drift=problem.drift)
+        trace, sums = without(nuisance, readings[chosen]), list[float]()
+        for onset_s in onsets_s:
+            shown = lag_course(torque, lags, time_s[chosen] - onset_s)
+            sums.append(fit_responses(trace, without(nuisance, shown))[1])
         return sums
 
     # A reading at the very onset precedes it: the first one, too, may follow it.
@@ -256,6 +252,7 @@ def notes_on_start(
     """
     time_s, readings = recording.time_s, recording.readings
     given, notes = experiment.start_given, list[Note]()
+    rejected = diagnosis.status == REJECTED
     ramped = _with_ramp(diagnosis.likelihood.problem.residuals)
     if not given and ramped and recording.read.from_s is None and is_cut_off(time_s):
         text = (
@@ -263,14 +260,14 @@ def notes_on_start(
             "clock of something longer: values hang on when it came. Say when the protocol started "
             "(--start, measurement.start_s), be it at 0, or what came before (--config, protocol)."
         )
-        notes.append(Note(DOUBT, text))
+        notes.append(Note(REJECTION if rejected else DOUBT, text))
     elif not given and begins_constant(time_s, readings):
         # A constant that is not zero is an offset, with which the onset would be biased.
         free = replace(experiment, offset=True)
         onset_s = estimate_onset(experiment, time_s, readings)
         if begins_constant(time_s, readings, onset_s):
             notes += _about_late_onset(OnsetFits(free, time_s, readings), diagnosis, onset_s)
-    if diagnosis.status != REJECTED and ramped and not notes:
+    if ramped and not rejected and not notes:
         notes += _about_ramp(diagnosis, ramped, recorded=experiment.record is not None)
     followed = experiment.record is not None and not experiment.uncertainty.get("steps")
     known = followed and experiment.load_errors is None
@@ -286,10 +283,6 @@ def _about_late_onset(fits: OnsetFits, diagnosis: Diagnosis, guess_s: float) -> 
     trace, noise_sd = (fits.time_s, fits.readings), fits.experiment.noise_sd
     given, needed = fits.at(0.0, diagnosis.likelihood.best), chdtri(1, levels.SURELY)
     fall_to = partial(compute_fall, len(trace[0]), given.misfit, noise_sd=noise_sd)
-    # Fitted along, a start cannot gain more than any sample, but for what moving it a little does.
-    of_any_sample = fit_any_sample(fits.posed(guess_s).residuals).misfit
-    if fall_to(of_any_sample) < levels.OF_WHAT_A_START_GAINS * needed:
-        return
     found = fits.best(guess_s)
     fall = fall_to(found.misfit)
     if fall < needed or not begins_constant(*trace, found.onset_s):

@@ -11,6 +11,12 @@ improved: a basin found anywhere in a profile is followed both ways. Where a pro
 certainty at an end, its limit is where it crosses the threshold. The limits are the outermost:
 values between them may be excluded, too, which gaps tell.
 
+To hold a quantity at a value, one member of it, a parameter, is eliminated: it follows from the
+others and the value (generalized reduced gradients [4]_). The dominant member is eliminated, chosen
+anew at every step among those that are not at a bound: any other would move far in a small step. A
+stiff penalty residual instead would be violated, the more the better the trace determines the
+quantity.
+
 Crossings are found by the Illinois rule [3]_, applied to the square root of the increase of chi^2,
 which is nearly linear in the quantity's logarithm: a few fits suffice.
 
@@ -19,11 +25,12 @@ References
 .. [1] D. J. Venzon and S. H. Moolgavkar, Applied Statistics 37 (1988), 87-94.
 .. [2] A. Raue et al., Bioinformatics 25 (2009), 1923-1929.
 .. [3] M. Dowell and P. Jarratt, BIT 11 (1971), 168-174.
+.. [4] J. Abadie and J. Carpentier, in R. Fletcher (ed.), Optimization, Academic Press, 1969, 37-47.
 """
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
 
 import numpy as np
@@ -31,8 +38,7 @@ import numpy as np
 import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.digits import plain, with_limits, within_limits
-from biogrip.fit.least_squares import FAIR, FINE, alike
-from biogrip.judging.constrained_fits import CLOSE, ConstrainedFits
+from biogrip.fit.least_squares import FAIR, FINE, LocalFits, Minima, Normal, alike
 from biogrip.judging.likelihood import Likelihood, Quantity, find_combinations
 
 DETERMINED = "determined"
@@ -120,7 +126,7 @@ class Finding:
 
     def words(self) -> str:
         """Return the verdict in words, e.g. ``determined: 34.1 N/m (31.2 to 37.3)``."""
-        words, unit = self._limits_in_words(), self._unit
+        words, unit = self._limits_in_words(), f" {self.quantity.unit}".rstrip()
         if self.gaps:
             ends = (end for gap in self.gaps for end in gap)
             gaps = within_limits(self.value, self.low or 0.0, self.high or 0.0, *ends)[3:]
@@ -131,7 +137,7 @@ class Finding:
         return words
 
     def _limits_in_words(self) -> str:
-        low, high, unit = self.low, self.high, self._unit
+        low, high, unit = self.low, self.high, f" {self.quantity.unit}".rstrip()
         if low is not None and high is not None:
             decades = plain(math.log10(high / low), 2)
             how = f" only to {decades} decades" if self.is_wide else ""
@@ -144,10 +150,6 @@ class Finding:
             slowest = f"a branch of the best fit relaxes in {plain(self.slowest_s, 2)} s,"
             return f"not stated: {slowest} longer than the trace lasts"
         return "not determined: the trace sets no limit within the search range"
-
-    @property
-    def _unit(self) -> str:
-        return f" {self.quantity.unit}" if self.quantity.unit else ""
 
 
 @dataclass(frozen=True)
@@ -166,6 +168,235 @@ class Trade:
         return (
             f"{names} trade against each other; determined is {self.finding.quantity.label}: {what}"
         )
+
+
+# E-folds from a bound at which a member counts as free, and by which rounding may exceed it.
+_FREE_OF_BOUND, _BEYOND_BOUND = 1e-9, 1e-7
+# Factor on the weight of members at a bound in the choice of the eliminated one.
+_UNWILLING = 1e-9
+_LEAST_SLOPE = 1e-200
+
+
+class QuantityConstraint:
+    """A constraint on each of n fits, which holds one quantity at a given value.
+
+    Each fit has the index of its quantity, (n,), and the logarithm of its value, within its range.
+    Bounds are (n, n_parameters). Branches must relax within a time for quantities that require it;
+    the penalty is in standard deviations of the noise, over which the fits' unit is (n,).
+    """
+
+    def __init__(
+        self,
+        quantities: Sequence[Quantity],
+        which: IntArray,
+        targets: Array,
+        low: Array,
+        high: Array,
+        longest_s: float,
+        unit: Array,
+    ) -> None:
+        self._unit = unit[:, None]
+        self._which, self._targets = which, targets
+        self._low, self._high = low, high
+        parameters = low.shape[1]
+        self._powers = np.zeros((len(quantities), parameters))
+        most = max(len(quantity.penalties) for quantity in quantities)
+        self._forms = np.zeros((len(quantities), most, parameters))
+        self._allowed, self._stiffness = np.zeros((2, len(quantities), most))
+        for index, quantity in enumerate(quantities):
+            self._powers[index, list(quantity.members)] = quantity.sign
+            for row, penalty in enumerate(quantity.penalties):
+                self._forms[index, row] = penalty.form(parameters)
+                self._allowed[index, row] = penalty.allowed(longest_s)
+                self._stiffness[index, row] = penalty.stiffness
+        self._senses = np.array([float(quantity.sense) for quantity in quantities])
+        self._most_members = max(len(quantity.members) for quantity in quantities)
+
+    def started(self, x: Array) -> Array:
+        """Move points, (n, n_parameters), onto the constraint."""
+        everyone = np.arange(len(x))
+        powers, sense = self._form(everyone)
+        of_sums = np.logaddexp.reduce(np.where(powers != 0, sense * x, -np.inf), axis=1)[:, None]
+        logs = np.where(sense == 0, np.sum(powers * x, axis=1)[:, None], sense * of_sums)
+        by = self._targets[:, None] - logs
+        first = np.cumsum(np.abs(powers), axis=1) * np.abs(powers) == 1
+        moved = x + by * np.where(sense == 0, powers * first, powers)
+        moved = np.clip(moved, self._low, self._high)
+        eliminated = self._dominant(moved, everyone, self._slopes(moved, everyone))
+        restored = self.restored(moved, everyone, eliminated)
+        if np.any(np.isnan(restored)):
+            raise ValueError("a quantity is to be held outside its range")
+        return restored
+
+    def added(self, normal: Normal, x: Array, fit: IntArray) -> Normal:
+        """Return the normal equations with penalty residuals for branches that relax too late."""
+        beyond, slopes = self._late(x, fit)
+        if not slopes.size:
+            return normal
+        return replace(
+            normal,
+            square_sum=normal.square_sum + np.sum(beyond**2, axis=1),
+            gradient=normal.gradient + np.sum(beyond[:, :, None] * slopes, axis=1),
+            information=normal.information + slopes.swapaxes(1, 2) @ slopes,
+        )
+
+    def price(self, x: Array) -> Array:
+        """Return the penalty on the sums of squares for branches that relax too late, (n,)."""
+        return np.sum(self._late(x, np.arange(len(x)))[0] ** 2, axis=1)
+
+    def eliminated(self, normal: Normal, x: Array, fit: IntArray) -> tuple[Normal, BoolArray]:
+        """Eliminate one parameter; return reduced equations and its mask, (n, n_parameters)."""
+        slopes = self._slopes(x, fit)
+        basic = self._dominant(x, fit, slopes)
+        # Minus the derivative of the eliminated parameter by each other one; 1 by itself.
+        ratio = slopes / np.sum(slopes * basic, axis=1, keepdims=True)
+        # Derivatives of all parameters by the others, none by the eliminated one.
+        by_others = np.eye(x.shape[1]) - basic[:, :, None] * ratio[:, None, :]
+        gradient = (normal.gradient[:, None] @ by_others)[:, 0]
+        information = by_others.swapaxes(1, 2) @ normal.information @ by_others
+        information += np.eye(x.shape[1]) * basic[:, :, None]
+        return replace(normal, gradient=gradient, information=information), basic
+
+    def restored(self, x: Array, fit: IntArray, eliminated: BoolArray) -> Array:
+        """Move points, (n, n_parameters), onto the constraint; NaN where bounds forbid that."""
+        x, basic, tried = x.copy(), eliminated, eliminated.copy()
+        left = np.arange(len(x))
+        for _ in range(self._most_members):
+            value = self._followed(x[left], fit[left], basic)
+            inside = np.clip(value, self._low[fit[left]], self._high[fit[left]])
+            x[left] = np.where(basic, inside, x[left])
+            reached = np.any(basic & (np.abs(value - inside) <= _BEYOND_BOUND), axis=1)
+            left = left[~reached]
+            if not len(left):
+                return x
+            # The eliminated member stays at its bound, and the next one is eliminated.
+            slopes = self._slopes(x[left], fit[left])
+            basic = self._dominant(x[left], fit[left], slopes, tried[left])
+            tried[left] |= basic
+        x[left] = np.nan
+        return x
+
+    def _dominant(
+        self, x: Array, fit: IntArray, slopes: Array, tried: BoolArray | None = None
+    ) -> BoolArray:
+        """Mark the member to eliminate, none if all have been tried."""
+        weight = np.abs(slopes)
+        free = (x > self._low[fit] + _FREE_OF_BOUND) & (x < self._high[fit] - _FREE_OF_BOUND)
+        weight = np.where(free, weight, _UNWILLING * weight)
+        if tried is not None:
+            weight = np.where(tried, 0.0, weight)
+        chosen = np.argmax(weight, axis=1)[:, None] == np.arange(x.shape[1])
+        return chosen & (weight > 0)
+
+    def _late(self, x: Array, fit: IntArray) -> tuple[Array, Array]:
+        """Return the residuals of hinges, (n, n_hinges), and their log-parameter derivatives."""
+        which = self._which[fit]
+        forms, stiffness = self._forms[which], self._stiffness[which] * self._unit[fit]
+        beyond = np.sum(forms * x[:, None], axis=2) - self._allowed[which]
+        late = beyond > 0
+        slopes = stiffness[:, :, None] * forms * late[:, :, None]
+        return np.where(late, stiffness * beyond, 0.0), slopes
+
+    def _slopes(self, x: Array, fit: IntArray) -> Array:
+        """Return the log-parameter derivatives of the quantities' logarithms on the constraint."""
+        powers, sense = self._form(fit)
+        shares = np.exp(np.minimum(sense * (x - self._targets[fit][:, None]), 0.0))
+        return np.where(sense == 0, powers, np.maximum(shares, _LEAST_SLOPE) * (powers != 0))
+
+    def _followed(self, x: Array, fit: IntArray, basic: BoolArray) -> Array:
+        """Solve the constraints for the marked members; infinite where there is no solution."""
+        powers, sense = self._form(fit)
+        target = self._targets[fit][:, None]
+        others = np.where(basic, 0.0, powers)
+        of_product = (target - np.sum(others * x, axis=1, keepdims=True)) * powers
+        taken = np.sum(np.abs(others) * np.exp(sense * (x - target)), axis=1, keepdims=True)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            of_sum = target + sense * np.log1p(-np.minimum(taken, 1.0))
+        return np.where(basic, np.where(sense == 0, of_product, of_sum), x)
+
+    def _form(self, fit: IntArray) -> tuple[Array, Array]:
+        """Return the powers of the members, (n, n_parameters), and each sum's sense, (n, 1)."""
+        which = self._which[fit]
+        return self._powers[which], self._senses[which][:, None]
+
+
+CLOSE = 1e-7
+"""Tolerance of fits that give chi^2 to 0.001; to the last digit takes three times as many steps."""
+
+
+class ConstrainedFits:
+    """Fits of several traces, whose problems are `alike`, with one of several quantities held.
+
+    Each profile belongs to a trace and a quantity; those of the first trace come first. Of each
+    there are the index of its `trace`, the optimum `best`, (n_profiles, n_parameters), the
+    logarithm of the quantity `at_best`, and `threshold` and `certainty`, no less, as in
+    `Likelihood`.
+    """
+
+    def __init__(self, likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity]) -> None:
+        self.likelihoods, self.quantities = likelihoods, quantities
+        problems = [likelihood.problem for likelihood in likelihoods]
+        self.trace = np.repeat(np.arange(len(likelihoods)), len(quantities))
+        self._optima = np.stack([likelihood.best for likelihood in likelihoods])
+        self.best = self._optima[self.trace]
+        self.at_best = np.array([q.log(x) for x in self._optima for q in quantities])
+        settings = [(one.threshold, one.certainty, one.misfit, one.noise_sd) for one in likelihoods]
+        threshold, certainty, self._misfit, self._noise_sd = np.array(settings).T
+        self.threshold = threshold[self.trace]
+        self.certainty = np.maximum(certainty, threshold)[self.trace]
+        self._fits = LocalFits(problems)
+        self._residuals = problems[0].residuals
+        scale = np.array([problem.residuals.trace.scatter for problem in problems])
+        self._unit = np.array([problem.residuals.noise_scale for problem in problems]) / scale
+        # Ratio of chi^2 to the fits' sums of squares.
+        self._ratio = (scale / self._noise_sd) ** 2
+
+    def at(
+        self, profile: IntArray, targets: Array, near: Array, tolerance: float
+    ) -> tuple[Array, Array]:
+        """Minimize chi^2 over all parameters with one quantity held at a value.
+
+        A target is the logarithm at which the quantity of a profile is held, within its range,
+        (n,). Starts near the fit, (n, n_parameters), are moved onto the constraint. Returns the
+        increases of chi^2 over each trace's optimum, (n,), and the fitted log-parameters.
+        """
+        trace, which = np.divmod(profile, len(self.quantities))
+        low, high = self._fits.low[trace], self._fits.high[trace]
+        last_s = self._residuals.duration_s
+        given = self.quantities, which, targets, low, high, last_s, self._unit[trace]
+        constraint = QuantityConstraint(*given)
+        minima = self._fits.fitted(near, trace, tolerance, constraint=constraint)
+        price = constraint.price(minima.x) * self._ratio[trace]
+        return self._increases(minima, trace) + price, minima.x
+
+    def from_each(
+        self, profile: IntArray, targets: Array, starts: Array, tolerance: float
+    ) -> tuple[Array, Array]:
+        """Fit as `at` does, each from several starts, (n_starts, n, n_parameters).
+
+        Returns the increases from each start, (n_starts, n), and the log-parameters of the lowest,
+        (n, n_parameters).
+        """
+        count, near = len(starts), np.concatenate(starts)
+        increases, x = self.at(np.tile(profile, count), np.tile(targets, count), near, tolerance)
+        increases = increases.reshape(count, -1)
+        return increases, x.reshape(starts.shape)[np.argmin(increases, axis=0), range(len(profile))]
+
+    def _increases(self, minima: Minima, trace: IntArray) -> Array:
+        excess = minima.misfit**2 - self._misfit[trace] ** 2
+        return self._residuals.samples * excess / self._noise_sd[trace] ** 2
+
+    def slowest(self, profile: int) -> float | None:
+        """Return the relaxation time in s of a branch of an optimum that is too slow, if any."""
+        quantity = self.quantities[profile % len(self.quantities)]
+        best, last_s = self.best[profile], self._residuals.duration_s
+        times = [
+            float(np.exp(penalty.form(len(best)) @ best))
+            for penalty in quantity.penalties
+            if penalty.before is None
+        ]
+        slowest = max(times, default=0.0)
+        return slowest if slowest > last_s else None
 
 
 # Improvement of a fit, relative to 1 + increase of chi^2, that has its neighbours fitted again.
@@ -311,12 +542,8 @@ def _find_crossings(points: Points) -> tuple[Array, Array]:
         last = np.searchsorted(of_below, profile, "right") - 1
         inside = below[np.where(end == 0, first, last)]
         outside = np.where(end == 0, inside - 1, inside + 1)
-        both = np.stack((inside, outside))
-        values, increases, x = points.values[both], points.increases[both], points.x[both]
-        elsewhere = points.extremes()[:, fits.trace[profile]]
-        limits, fitted = crossings(fits, profile, values, increases, x, elsewhere)
+        limits, fitted = _crossings(points, profile, np.stack((inside, outside)))
         crossed[end, profile], at_crossings[end, profile] = limits, fitted
-        points.increases[both], points.x[both] = increases, x
         # Where the outer point has come below the threshold, the next bracket is further out.
         on = np.isnan(limits) & (outside != ends[end, profile])
         end, profile = end[on], profile[on]
@@ -327,38 +554,22 @@ def _find_crossings(points: Points) -> tuple[Array, Array]:
 _MOST_FITS_OF_CROSSING, _WIDTH_OF_JUMP = 40, 1e-7
 
 
-def crossings(
-    fits: ConstrainedFits,
-    profile: IntArray,
-    values: Array,
-    increases: Array,
-    x: Array,
-    elsewhere: Array,
-) -> tuple[Array, Array]:
+def _crossings(points: Points, profile: IntArray, both: IntArray) -> tuple[Array, Array]:
     """Find the logarithms of quantities at which the increase of chi^2 equals the threshold, (n,).
 
     1. A value is tried between an inner end, below the threshold, and an outer, above it.
     2. It is fitted from both ends and between: they may lie in different basins, of which the
-       deeper one counts. At first the best fit from elsewhere is one more start.
+       deeper one counts. At first the best fit from the ends of all profiles is one more start.
     3. Where the basin is deeper than that of the outer end, the outer end is fitted from there.
     4. One end of each bracket moves to the value, until the threshold or a jump is met.
 
-    Parameters
-    ----------
-    profile
-        Profile of each crossing, (n,).
-    values, increases, x
-        Logarithms, increases of chi^2 and fits of both ends, (2, n) or (2, n, n_parameters). Lower
-        fits that are found at outer ends replace theirs, in place.
-    elsewhere
-        Starts that may lead to deeper basins, (n_starts, n, n_parameters).
-
-    Returns
-    -------
-    tuple[Array, Array]
-        The crossings, NaN where a deeper basin is below the threshold at the outer end, as the
-        crossing is further out; and their fits, (n, n_parameters).
+    Given are the profile of each crossing, (n,), and its inner and outer point, (2, n). Returns the
+    crossings, NaN where a deeper basin is below the threshold at the outer end, as the crossing is
+    further out; and their fits, (n, n_parameters).
     """
+    fits, outer_point = points.fits, both[1]
+    values, increases, x = points.values[both], points.increases[both], points.x[both]
+    elsewhere = points.extremes()[:, fits.trace[profile]]
     threshold = fits.threshold[profile]
     ends, ends_x, excess = values.copy(), x.copy(), excess_of(increases, threshold)
     crossed, at_crossings, left = values[1].copy(), x[1].copy(), np.arange(len(profile))
@@ -379,8 +590,8 @@ def crossings(
         if np.any(missed):
             outer = left[missed]
             beyond = fits.at(profile[outer], values[1, outer], fitted[missed], FINE)
-            keep_lower(increases[1], x[1], outer, *beyond)
-        void = increases[1, left] < threshold[left]
+            keep_lower(points.increases, points.x, outer_point[outer], *beyond)
+        void = points.increases[outer_point[left]] < threshold[left]
         crossed[left], at_crossings[left] = np.where(void, np.nan, tried), fitted
         side = (over > 0).astype(np.int64)
         ends[side, left], ends_x[side, left], excess[side, left] = tried, fitted, over

@@ -7,10 +7,8 @@ variance [1]_. That of successive differences tests for correlation, that of mea
 for what is slow.
 
 A step of all readings from some time on is one direction more: its share of the sum of squares is
-beta-distributed in white noise. `find_step` scans all times; the chance that a scan of correlated
-statistics exceeds a level is that of the first one, and for each further one that of a random
-walk's upcrossing [9]_. `compare_halves` asks whether two parts of the trace, fitted apart, agree:
-Chow's test [8]_, with the fit's slopes. Inertia in a frequency sweep is one direction more, too.
+beta-distributed in white noise. `find_step` scans all times. Inertia in a frequency sweep is one
+direction more, too.
 
 Residuals, (n_samples,), are over the noise's standard deviation where that is not the same. The
 basis of what the fit absorbs has orthonormal rows, (n_directions, n_samples), see `absorbed`.
@@ -22,21 +20,17 @@ References
 .. [4] H. D. Patterson and R. Thompson, Biometrika 58 (1971), 545-554: restricted likelihood.
 .. [5] F. E. Satterthwaite, Biometrics Bulletin 2 (1946), 110-114.
 .. [6] H. Akaike, IEEE Transactions on Automatic Control 19 (1974), 716-723.
-.. [7] R. A. Fisher, Proceedings of the Royal Society of London A 125 (1929), 54-59.
-.. [8] G. C. Chow, Econometrica 28 (1960), 591-605: equality of two regressions.
-.. [9] D. Siegmund and B. Yakir, The Statistics of Gene Mapping, Springer, 2007: section 5.2.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import betainc, betaincc, fdtrc, ndtr, ndtri, pdtrc, stdtr
+from scipy.special import betainc, betaincc, fdtrc, pdtrc, stdtr
 
 import biogrip.levels as levels
-from biogrip.arrays import Array, BoolArray, IntArray
+from biogrip.arrays import Array, BoolArray
 from biogrip.digits import plain
-from biogrip.fit.trace_noise import absorbed
 from biogrip.physics.noise import without
 from biogrip.physics.protocol import is_storage
 from biogrip.physics.residuals import Residuals
@@ -45,8 +39,6 @@ from biogrip.physics.residuals import Residuals
 _STRETCHES, _SHORTEST = 20, 5
 # Sums that a misfit is estimated from; correlation lengths and shares of white noise to try.
 _SUMS, _LENGTHS, _WHITE = 200, 10, (0.001, 0.03, 0.2, 0.6)
-# Frequencies of a line are so much finer than the periodogram's.
-_FINER = 16
 
 
 def correlated(residual: Array, basis: Array) -> tuple[float, float]:
@@ -121,28 +113,6 @@ def _chance_of_less(observed: float, first: float, second: float, free: int, mos
     weight = share * (1 - share) / (variance / most**2) - 1
     chance = betainc(share * weight, (1 - share) * weight, min(max(observed / most, 0.0), 1.0))
     return float(chance)
-
-
-def find_line(residual: Array, time_s: Array) -> tuple[float, float, Array]:
-    """Return the frequency of the strongest sine, its chance in white noise, and its directions.
-
-    The chance is that of the largest ordinate of the periodogram [7]_, one where times are not
-    evenly spaced; directions are cosine and sine as orthonormal rows, (2, n_samples).
-    """
-    n, apart = len(residual), np.diff(time_s)
-    if n < 4 * levels.PERIODS or np.ptp(apart) > levels.EVEN * np.median(apart):
-        return 0.0, 1.0, np.zeros((0, n))
-    power = np.abs(np.fft.rfft(residual)[1 : (n + 1) // 2]) ** 2
-    share = np.max(power[levels.PERIODS - 1 :]) / np.sum(power)
-    chance = min(len(power) * float(1 - share) ** (len(power) - 1), 1.0)
-    if chance >= levels.FALSE_ALARM:
-        return 0.0, chance, np.zeros((0, n))
-    fine = np.abs(np.fft.rfft(residual, _FINER * n)[: _FINER * ((n + 1) // 2)]) ** 2
-    slowest = _FINER * levels.PERIODS
-    frequency = (slowest + np.argmax(fine[slowest:])) / (_FINER * n * np.mean(apart))
-    angle = 2 * np.pi * frequency * time_s
-    basis = np.linalg.qr(np.column_stack((np.cos(angle), np.sin(angle))))[0].T
-    return float(frequency), chance, basis
 
 
 def by_leverage(residual: Array, basis: Array) -> Array:
@@ -233,44 +203,8 @@ def _restricted(covariance: Array, left: Array, taken: Array) -> tuple[float, fl
     return free * np.log(size) + 2 * float(determinants), size
 
 
-# Norm of directions of a part, without what the whole fit absorbs, that are more than rounding.
-_MORE = 1e-6
 # Most numbers in the steps that are scanned.
 _AT_ONCE = 4_000_000
-
-
-@dataclass(frozen=True)
-class Steps:
-    """Steps of unit size at all times that can be told."""
-
-    before: IntArray
-    """Index of the first reading after each, (n_steps,)."""
-    whole: Array
-    """What each shows in residuals, (n_steps, n_samples)."""
-    norms: Array
-    """Norms of what is left of each without what the fit absorbs, (n_steps,)."""
-    change: Array
-    """One minus the correlation of what is left of each with the next, (n_steps - 1,)."""
-    freedom: int
-    """Degrees of freedom of what the fit leaves."""
-
-    def along(self, residual: Array) -> Array:
-        """Return the part along each step of what a fit leaves, (n_samples,)."""
-        # No matrix of what is left of all steps is formed, which takes most of the time.
-        return self.whole @ residual / self.norms
-
-    def chance(self, share: float) -> float:
-        """Return the chance that white noise has such a share of its squares in one of them."""
-        alone = float(betaincc(0.5, 0.5 * (self.freedom - 1), min(share, 1.0)))
-        level = -float(ndtri(max(alone, 1e-300) / 2))
-        half = np.maximum(0.5 * level * np.sqrt(2 * self.change), 1e-9)
-        walk = (ndtr(half) - 0.5) / (half * (half * ndtr(half) + _density(half)))
-        return min(alone + float(2 * level * _density(level) * np.sum(self.change * walk)), 1.0)
-
-
-def _density(level: Array | float) -> Array:
-    """Return the density of the normal distribution."""
-    return np.exp(-0.5 * np.square(level)) / np.sqrt(2 * np.pi)
 
 
 @dataclass(frozen=True)
@@ -289,65 +223,39 @@ class Step:
     """What such a fit absorbs, (n_directions + 1, n_samples)."""
 
 
-def steps_of(basis: Array, cleared: Callable[[Array], Array]) -> Steps:
-    """Return the steps that can be told beside a fit.
+def find_step(residual: Array, basis: Array, cleared: Callable[[Array], Array]) -> Step | None:
+    """Scan residuals for a step that a fit would leave; None where none can be told.
 
     `cleared` turns functions of time, (n, n_samples), into residuals. Of very many readings not
-    every one is the first of a step.
+    every one is the first of a step. Its chance is at most as said: that of one step times their
+    number.
     """
-    samples = basis.shape[1]
+    samples, free = len(residual), len(residual) - len(basis)
     count = min(samples - 1, max(_AT_ONCE // samples, 1))
     before = np.unique(np.linspace(1, samples - 1, count).astype(np.int64))
     whole = cleared((np.arange(samples) >= before[:, None]).astype(float))
-    of_whole, taken = np.einsum("ij,ij->i", whole, whole), whole @ basis.T
-    square = of_whole - np.sum(taken**2, axis=1)
+    of_whole = np.einsum("ij,ij->i", whole, whole)
+    square = of_whole - np.sum((whole @ basis.T) ** 2, axis=1)
     # The step back is the same step if a constant is absorbed.
     (constant,) = cleared(np.ones((1, samples)))
     back = of_whole - 2 * (whole @ constant) + constant @ constant
-    told = square > levels.TOLD * np.minimum(of_whole, back)
-    if not np.all(told):
-        before, whole, taken, square = (of[told] for of in (before, whole, taken, square))
-    norms = np.sqrt(square)
-    products = np.einsum("ij,ij->i", whole[:-1], whole[1:])
-    products -= np.einsum("ij,ij->i", taken[:-1], taken[1:])
-    change = np.clip(1 - products / (norms[:-1] * norms[1:]), 0.0, 1.0)
-    return Steps(before, whole, norms, change, samples - len(basis))
-
-
-def find_step(residual: Array, basis: Array, cleared: Callable[[Array], Array]) -> Step | None:
-    """Scan residuals for a step; None where none can be told."""
-    steps = steps_of(basis, cleared)
-    if not len(steps.before) or steps.freedom < 2:
+    told = np.flatnonzero(square > levels.TOLD * np.minimum(of_whole, back))
+    if not len(told) or free < 2:
         return None
-    along = steps.along(without(basis, residual))
-    found = int(np.argmax(np.abs(along)))
-    size = float(along[found])
-    direction = without(basis, steps.whole[found]) / steps.norms[found]
+    # No matrix of what is left of all steps is formed, which takes most of the time.
+    along = (whole @ without(basis, residual))[told] / np.sqrt(square[told])
+    largest = int(np.argmax(np.abs(along)))
+    step, size = told[largest], float(along[largest])
+    norm = float(np.sqrt(square[step]))
+    direction = without(basis, whole[step]) / norm
+    share = min(size**2 / float(residual @ residual), 1.0)
     return Step(
-        int(steps.before[found]),
-        size / float(steps.norms[found]),
-        steps.chance(size**2 / float(residual @ residual)),
+        int(before[step]),
+        size / norm,
+        min(len(told) * float(betaincc(0.5, 0.5 * (free - 1), share)), 1.0),
         residual - size * direction,
         np.vstack((basis, direction)),
     )
-
-
-def parts_apart(basis: Array, split: int) -> Array:
-    """Return what fits to the parts before and after a reading absorb beside one to both."""
-    apart = without(basis, np.where(np.arange(basis.shape[1]) < split, basis, 0.0))
-    apart = apart[np.linalg.norm(apart, axis=1) > _MORE]
-    return absorbed(apart) if len(apart) else apart
-
-
-def compare_halves(residual: Array, basis: Array, split: int) -> float:
-    """Return the chance that parts of white noise before and after a reading differ as much."""
-    more = parts_apart(basis, split)
-    left = len(residual) - len(basis) - len(more)
-    if not len(more) or left < 1:
-        return 1.0
-    gained = float(np.sum((more @ residual) ** 2))
-    rest = max(float(residual @ residual) - gained, 1e-300)
-    return float(fdtrc(len(more), left, gained / len(more) * left / rest))
 
 
 def find_inertia(

@@ -75,8 +75,6 @@ class Course:
     """End of the protocol."""
     deforms: bool = False
     """True if a deformation is controlled, and the load is read: relaxation."""
-    smoothed: bool = False
-    """True if noise was smoothed out of a record, of which something may be left."""
     sweeps: ClassVar[bool] = False
     """True if it is a `Sweep`, whose readings do not follow one another in time."""
 

@@ -125,7 +125,7 @@ class Recording:
             "outside": "Left out by from_s and until_s",
             "others": "Left out, for rows asks for others",
         }
-        said += [f"{counts[key]}: {counted(form[key], 'row')}." for key in counts if key in form]
+        said += [f"{counts[key]}: {counted(form[key], 'row')}." for key in counts if form.get(key)]
         if self.load_noise:
             said.append(
                 f"Smoothed out of {self.read.load}, since the readings do not follow it: what "

@@ -25,7 +25,7 @@ from biogrip.fit.least_squares import identify_from
 from biogrip.fit.trace_fit import TraceFit, fit_least_squares
 from biogrip.identify.data import judged_data
 from biogrip.identify.identify import identify_alike
-from biogrip.judging.diagnosis import Diagnosis, diagnose, profiled, settled
+from biogrip.judging.diagnosis import Diagnosis, diagnose, settled
 from biogrip.judging.likelihood import Likelihood, Quantity, parameters_and_sum
 from biogrip.judging.profiles import DETERMINED, Finding, compute_findings
 from biogrip.physics.noise import add_noise, rms, standard_deviation
@@ -170,7 +170,7 @@ def judge_quantities(
 
     def profile(likelihoods: Sequence[Likelihood]) -> list[Diagnosis]:
         every = compute_findings(likelihoods, quantities)
-        return [profiled(*pair, []) for pair in zip(likelihoods, every, strict=True)]
+        return list(map(Diagnosis, likelihoods, every))
 
     problems, best_fits = [fit.problem for fit in fits], [fit.found for fit in fits]
     judged = settled(problems, best_fits, profile, confidence=confidence)
