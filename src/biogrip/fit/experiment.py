@@ -72,7 +72,7 @@ class Experiment:
     deeper: float = 0.0
     """By how much a tip is deeper than recorded, in the depth's unit (`in_contact`)."""
     fit_contact: bool = False
-    """True if that is fitted along (`biogrip.identify.contact`)."""
+    """True if that is fitted along (`biogrip.identify.recorded_load`)."""
     load_errors: Array | None = field(default=None, compare=False)
     """Directions in which a record that was smoothed may be off, (n_directions, n), each as long as
     its standard deviation."""

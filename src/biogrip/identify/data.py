@@ -156,7 +156,7 @@ def _fitted_along(
     if diagnosis.onset_limits_s:
         found["onset_limits_s"] = [found["onset_s"] + end_s for end_s in diagnosis.onset_limits_s]
     if experiment.fit_contact:
-        from biogrip.identify.contact import depth_limits
+        from biogrip.identify.recorded_load import depth_limits
 
         value, *limits = depth_limits(diagnosis)
         found |= {"contact_m": value, "contact_limits_m": limits}

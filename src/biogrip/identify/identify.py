@@ -139,7 +139,7 @@ def _notes_on_trace(judged: Diagnosis, on_fit: list[Note], opinion: list[Note]) 
     start: list[Note] = []
     if recording.read.has_tip:
         # Imported here: most traces are of no tip.
-        from biogrip.identify.contact import notes_on_contact
+        from biogrip.identify.recorded_load import notes_on_contact
 
         start += notes_on_contact(judged)
     start = start or notes_on_start(experiment, recording.time_s, recording.readings, judged)

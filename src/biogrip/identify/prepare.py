@@ -84,7 +84,7 @@ def prepare(recording: Recording, experiment: Experiment) -> Trace:
     """
     # Imported here, as below: of most traces no load was recorded.
     if experiment.record is not None:
-        from biogrip.identify.load_noise import with_its_steps, without_noise
+        from biogrip.identify.recorded_load import with_its_steps, without_noise
 
         experiment, recording = with_its_steps(experiment, recording)
     experiment, recording = _with_share(experiment, recording)
@@ -93,7 +93,7 @@ def prepare(recording: Recording, experiment: Experiment) -> Trace:
         experiment, recording = without_noise(experiment, recording)
     experiment, recording = _with_zero(experiment, recording)
     if experiment.fit_contact:
-        from biogrip.identify.contact import with_contact
+        from biogrip.identify.recorded_load import with_contact
 
         experiment = with_contact(for_trace(experiment, recording), recording)
     experiment = for_trace(experiment, recording)

@@ -136,18 +136,12 @@ def fit(case: Case, seeds: Sequence[int], measurements: Path, fits: Path) -> Non
         rngs = [{name: stream(*whose, seed, f"model {name}") for name in models} for seed in group]
         done = partial(progress.done, len(group))
         fits_of_traces = fit_models(posed, case.block.least_squares, rngs, done)
-        rows += [
-            (
-                case.name,
-                name,
-                seed,
-                len(models[name].names),
-                len(recorded.time_s),
-                f"{answers[name].misfit:.8e}",
-            )
-            for name in models
-            for seed, answers in zip(group, fits_of_traces, strict=True)
-        ]
+        for name, model in models.items():
+            sizes = len(model.names), len(recorded.time_s)
+            rows += [
+                (case.name, name, seed, *sizes, f"{answers[name].misfit:.8e}")
+                for seed, answers in zip(group, fits_of_traces, strict=True)
+            ]
     records.MODEL_FITS.write(fits, rows)
 
 
