@@ -86,12 +86,12 @@ def prepare(recording: Recording, experiment: Experiment) -> Trace:
     if experiment.record is not None:
         from biogrip.identify.recorded_load import with_its_steps, without_noise
 
-        experiment, recording = with_its_steps(experiment, recording)
-    experiment, recording = _with_share(experiment, recording)
+        recording, experiment = with_its_steps(recording, experiment)
+    recording, experiment = _with_share(recording, experiment)
     recording = _checked(recording, experiment)
     if experiment.record is not None:
-        experiment, recording = without_noise(experiment, recording)
-    experiment, recording = _with_zero(experiment, recording)
+        recording, experiment = without_noise(recording, experiment)
+    recording, experiment = _with_zero(recording, experiment)
     if experiment.fit_contact:
         from biogrip.identify.recorded_load import with_contact
 
@@ -105,47 +105,47 @@ def prepare(recording: Recording, experiment: Experiment) -> Trace:
     return recording, experiment
 
 
-def _with_share(experiment: Experiment, recording: Recording) -> tuple[Experiment, Recording]:
+def _with_share(recording: Recording, experiment: Experiment) -> Trace:
     """Take standard deviations that are a share of each reading for that of the smooth course.
 
     A reading that is low by chance would weigh more, and all of them be too low by twice the square
     of the share.
     """
     if recording.sd is None or not np.all(recording.readings):
-        return experiment, recording
+        return recording, experiment
     shares = recording.sd / np.abs(recording.readings)
     share = float(np.median(shares))
     if np.any(np.abs(shares - share) > levels.SAME_SHARE * share):
-        return experiment, recording
+        return recording, experiment
     said = (
         f"Standard deviations are {plain(100 * share, 2)} % of each reading. Taken is that share "
         "of the smooth course: a reading that is low by chance would weigh too much."
     )
     recording = replace(recording, sd=None, remarks_before=(*recording.remarks_before, said))
-    return replace(experiment, noise_share=share), recording
+    return recording, replace(experiment, noise_share=share)
 
 
-def _with_zero(experiment: Experiment, recording: Recording) -> tuple[Experiment, Recording]:
+def _with_zero(recording: Recording, experiment: Experiment) -> Trace:
     """Fit an offset along where rows before the load tell it, and say so.
 
     With the rows in the trace, limits allow for what they leave uncertain of the zero.
     """
     told = experiment.offset or "offset" not in experiment.undeclared
     if told or experiment.simulated or experiment.instrument.sweeps:
-        return experiment, recording
+        return recording, experiment
     begins_s = 0.0
     if experiment.record is not None:
         loads = np.abs(evaluate(experiment.torque, experiment.record[:, 0]))
         begins_s = float(experiment.record[np.argmax(loads > levels.NO_LOAD * loads.max()), 0])
     if not begins_constant(recording.time_s, recording.readings, begins_s):
-        return experiment, recording
+        return recording, experiment
     before = recording.readings[recording.time_s < begins_s][:-1]
     read, unit = recording.read.instrument.read, recording.units[1]
     zero = f"{plain(read.in_unit(float(np.mean(before)), unit))} {unit}".removesuffix(" 1")
     rows = f"{len(before)} rows before the {experiment.instrument.controlled.name}"
     said = (*recording.remarks_before, f"Zero from {rows}: {zero}, taken off.")
     recording = replace(recording, remarks_before=said)
-    return replace(experiment, offset=True), recording
+    return recording, replace(experiment, offset=True)
 
 
 def for_trace(experiment: Experiment, recording: Recording) -> Experiment:
@@ -193,7 +193,7 @@ def _checked(trace: Recording, experiment: Experiment) -> Recording:
                 f"allowed with {experiment.model.name} are {1 / LONGEST_S:g} to {1 / SHORTEST_S:g}."
             )
         return _with_deviations(trace, experiment)
-    zeroed, _ = _with_zero(experiment, trace)
+    _, zeroed = _with_zero(trace, experiment)
     if suspicion := check_recording(trace, zeroed):
         trace = replace(trace, remarks_before=(*trace.remarks_before, suspicion))
     if experiment.noise_share is None:

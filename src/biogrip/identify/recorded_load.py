@@ -68,23 +68,23 @@ _STENCIL, _ORDER = np.array([-1.0, 3.0, -3.0, 1.0]), 3
 _DEPTHS_TRIED, _FURTHEST, _MOST_EVALUATIONS = 41, 0.5, 50
 
 
-def without_noise(experiment: Experiment, recording: Recording) -> tuple[Experiment, Recording]:
+def without_noise(recording: Recording, experiment: Experiment) -> tuple[Recording, Experiment]:
     """Return an experiment whose record is smoothed, if its noise is the sensor's, and say so."""
     assert experiment.record is not None
     values, errors = smoothed(experiment.record[:, 1])
     left = experiment.record[:, 1] - values
     if not np.any(left):
-        return experiment, recording
+        return recording, experiment
     smooth = np.column_stack((experiment.record[:, 0], values))
     both, count = [experiment, replace(experiment, record=smooth)], len(recording.time_s)
     rest = _left_by_any(both, recording.time_s, recording.readings)
     if rest[0] <= rest[1] * np.exp(levels.SMOOTHED / min(count, _MOST_READINGS)):
-        return experiment, recording
+        return recording, experiment
     noise = float(np.std(left) / np.max(np.abs(experiment.record[:, 1])))
-    return replace(both[1], load_errors=errors), replace(recording, load_noise=noise)
+    return replace(recording, load_noise=noise), replace(both[1], load_errors=errors)
 
 
-def with_its_steps(experiment: Experiment, recording: Recording) -> tuple[Experiment, Recording]:
+def with_its_steps(recording: Recording, experiment: Experiment) -> tuple[Recording, Experiment]:
     """Return an experiment whose record has its steps, of uncertain times, and no tare, and say so.
 
     A step of a record that is rounded may be one of rounding alone: it is none if readings follow
@@ -109,12 +109,12 @@ def with_its_steps(experiment: Experiment, recording: Recording) -> tuple[Experi
         uncertainty["all steps"] = {"share": 1.0}
     experiment = replace(experiment, record=record, uncertainty=uncertainty)
     if not (tare := tare_of(experiment, recording)):
-        return experiment, recording
+        return recording, experiment
     controlled = experiment.instrument.controlled
     size = f"{plain(tare)} {controlled.unit}".rstrip()
     said = f"Taken off the {controlled.name}, a tare that readings do not follow: {size}."
     recording = replace(recording, remarks_before=(*recording.remarks_before, said))
-    return replace(experiment, record=record - (0.0, tare)), recording
+    return recording, replace(experiment, record=record - (0.0, tare))
 
 
 def tare_of(experiment: Experiment, recording: Recording) -> float:
