@@ -51,11 +51,10 @@ def gripper_functions(experiment: Experiment, time_s: Array, parameters: Array) 
         gripper, torque = experiment.gripper, experiment.torque
         if part == "torque":
             torque = torque.times(1 + error)
-        elif part == "steps":
-            later_s = np.array([error if key == number else 0.0 for number in errors_s])
+        elif part.endswith("steps"):
+            alone = [float(step == key) for step in errors_s]
+            later_s = error * np.array(alone if part == "steps" else [*errors_s.values()])
             torque = experiment.with_steps_later(later_s).torque
-        elif part == "all steps":
-            torque = experiment.with_steps_later(error * np.array([*errors_s.values()])).torque
         elif part == "gripper":
             gripper = replace(gripper, **{key: getattr(gripper, key) + error})
         elif part:
