@@ -80,7 +80,7 @@ def _least(sizes: Array, rest: Array, share: float) -> float:
     """Return the least standard deviation, from the smallest readings."""
     few = max(_FEWEST, int(_SMALL * len(sizes)))
     smallest = np.argsort(sizes, kind="stable")[:few]
-    scatter, size = (np.sqrt(np.mean(own[smallest] ** 2)) for own in (rest, sizes))
+    scatter, size = (np.sqrt(np.mean(values[smallest] ** 2)) for values in (rest, sizes))
     if scatter <= _EXCESS * share * size:
         return share * float(np.median(sizes[smallest]))
     return float(scatter)

@@ -101,10 +101,10 @@ def compute_growth(residual: Array, readings: Array, rounding: float = 0.0) -> A
         return np.ones(len(residual))
     from scipy.optimize import minimize_scalar
 
-    found = minimize_scalar(
+    best = minimize_scalar(
         lambda odds: _deviance(apart, _growth(odds, size)), bounds=(_GROWTH_LEAST, _GROWTH_MOST)
     )
-    return _growth(float(found.x), size)
+    return _growth(float(best.x), size)
 
 
 def growth_left(residuals: Residuals, log_parameters: Array) -> Array:

@@ -130,8 +130,8 @@ def _with_zero(recording: Recording, experiment: Experiment) -> Trace:
 
     With the rows in the trace, limits allow for what they leave uncertain of the zero.
     """
-    told = experiment.offset or "offset" not in experiment.undeclared
-    if told or experiment.simulated or experiment.instrument.sweeps:
+    known = experiment.offset or "offset" not in experiment.undeclared
+    if known or experiment.simulated or experiment.instrument.sweeps:
         return recording, experiment
     begins_s = 0.0
     if experiment.record is not None:
@@ -155,8 +155,8 @@ def for_trace(experiment: Experiment, recording: Recording) -> Experiment:
     known, correlation = recording.sd_known, recording.correlation
     experiment = experiment.weighted(recording.sd, known=known, correlation=correlation)
     ranges = ranges_of(experiment, recording.time_s, recording.readings)
-    found = {name: it for name, it in ranges.items() if name not in experiment.given_ranges}
-    return replace(experiment, ranges={**experiment.ranges, **found})
+    ranges = {name: genes for name, genes in ranges.items() if name not in experiment.given_ranges}
+    return replace(experiment, ranges={**experiment.ranges, **ranges})
 
 
 def _checked(trace: Recording, experiment: Experiment) -> Recording:
@@ -382,10 +382,10 @@ def check_moduli(sweep: Recording, sd: Array | float) -> None:
     """
     least = np.broadcast_to(sd * ndtri(levels.BELOW_ZERO), sweep.readings.shape)
     for sample in np.flatnonzero(sweep.readings <= least)[:1]:
-        at, found = float(sweep.time_s[sample]), sweep.readings[sample]
+        at, modulus = float(sweep.time_s[sample]), sweep.readings[sample]
         above = f"{plain(least[sample], 2)} by the noise that is given" if least[sample] else "0"
         raise BiogripError(
-            f"{place(sweep.path, int(sweep.lines[sample]))}: found a modulus of {found:.3g}, at "
+            f"{place(sweep.path, int(sweep.lines[sample]))}: found a modulus of {modulus:.3g}, at "
             f"{SWEEP.place(at)}; allowed is one above {above}. {_NEGATIVE[at > 0]}, or it is below "
             "the noise: say how much that is (--noise), or leave these rows out (--from, --until)."
         )
@@ -490,6 +490,6 @@ def _check_turn(
 def _other_units(unit: str, units: Mapping[str, float], fits: Callable[[float], bool]) -> str:
     """Return a hint on units, or else factors, in which the numbers would be plausible."""
     named = [(size / units[unit], name) for name, size in units.items()]
-    found = [f"{factor:.4g} times (is it in {name}?)" for factor, name in named if fits(factor)]
-    found = found or [f"{factor:g} times" for factor in (1e-6, 1e-3, 1e3, 1e6) if fits(factor)]
-    return f" It would fit if it were {' or '.join(found)}." if found else ""
+    factors = [f"{factor:.4g} times (is it in {name}?)" for factor, name in named if fits(factor)]
+    factors = factors or [f"{factor:g} times" for factor in (1e-6, 1e-3, 1e3, 1e6) if fits(factor)]
+    return f" It would fit if it were {' or '.join(factors)}." if factors else ""

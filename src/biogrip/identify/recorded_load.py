@@ -135,7 +135,7 @@ def tare_of(experiment: Experiment, recording: Recording) -> float:
     given = recording.time_s - start_s, recording.readings
     level = chdtri(1, levels.SURELY) / min(len(load), _MOST_READINGS)
     both = [experiment, replace(experiment, record=record - (0.0, tare))]
-    rest = _left_by_any([replace(each, offset=True) for each in both], *given)
+    rest = _left_by_any([replace(posed, offset=True) for posed in both], *given)
     if rest[0] <= rest[1] * np.exp(level if load[0, 0] >= start_s else -level):
         return 0.0
     rest = _left_by_any(both, *given)
@@ -144,12 +144,12 @@ def tare_of(experiment: Experiment, recording: Recording) -> float:
 
 def _left_by_any(experiments: Sequence[Experiment], time_s: Array, readings: Array) -> list[float]:
     """Return the mean square that any sample leaves of readings, for each of several loads."""
-    some = np.unique(np.linspace(0, len(time_s) - 1, _MOST_READINGS).astype(np.int64))
+    thinned = np.unique(np.linspace(0, len(time_s) - 1, _MOST_READINGS).astype(np.int64))
     lags = spread_lags(experiments[0].torque, time_s, _LAGS_A_DECADE)
-    nuisance, left = experiments[0].nuisance(time_s[some]), []
+    nuisance, left = experiments[0].nuisance(time_s[thinned]), []
     for experiment in experiments:
-        responses = without(nuisance, lag_course(experiment.torque, lags, time_s[some]))
-        left.append(fit_responses(without(nuisance, readings[some]), responses)[1])
+        responses = without(nuisance, lag_course(experiment.torque, lags, time_s[thinned]))
+        left.append(fit_responses(without(nuisance, readings[thinned]), responses)[1])
     return left
 
 
@@ -164,23 +164,23 @@ def smoothed(values: Array) -> tuple[Array, Array]:
     far = np.maximum(_FAR * np.median(changes), levels.ONE_STEP * step)
     ends = [0, *(1 + np.flatnonzero(changes > far)).tolist(), len(values)]
     corners = [first + at for first, last in pairwise(ends) for at in _parted(values[first:last])]
-    found, errors = values.copy(), [np.zeros((0, len(values)))]
+    smooth, errors = values.copy(), [np.zeros((0, len(values)))]
     noise_sd = estimate_noise(values, 0.0)
     for first, last in pairwise(sorted([*ends, *(corners if not step else [])])):
         stretch, beside = values[first:last], ((0, 0), (first, len(values) - last))
         few = last - first < _FEWEST and np.std(stretch) < _STILL * noise_sd
         if few or is_still(stretch):
-            found[first:last] = np.mean(stretch)
+            smooth[first:last] = np.mean(stretch)
             scatter = max(float(np.std(stretch)), noise_sd * few)
             error = np.full((1, last - first), scatter / np.sqrt(last - first))
             errors.append(np.pad(error, beside))
         elif last - first >= _FEWEST:
-            found[first:last], left = _graduated(stretch, step)
+            smooth[first:last], left = _graduated(stretch, step)
             errors.append(np.pad(left, beside))
     # Beside a corner nothing tells its rows but themselves.
     beside_corners = np.add.outer(corners, np.arange(-_BESIDE, _BESIDE)).ravel().astype(np.int64)
     errors.append(noise_sd * np.eye(len(values))[beside_corners])
-    return found, np.vstack(errors)
+    return smooth, np.vstack(errors)
 
 
 @dataclass(frozen=True, eq=False)
@@ -251,12 +251,12 @@ def _parted(values: Array) -> list[int]:
     most = _Stretch(rows).cross_validation() - _BETTER
     while True:
         tried = np.unique(np.linspace(low, high, _PARTINGS).astype(np.int64))
-        found = [
+        predicted = [
             _Stretch(rows[:at]).cross_validation() + _Stretch(rows[at:]).cross_validation()
             for at in tried.tolist()
         ]
-        best = int(np.argmin(found))
-        if found[best] > most:
+        best = int(np.argmin(predicted))
+        if predicted[best] > most:
             return []
         low, high = tried[max(best - 1, 0)], tried[min(best + 1, len(tried) - 1)]
         if tried[-1] - tried[0] < _PARTINGS:
