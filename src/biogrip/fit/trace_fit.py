@@ -240,13 +240,12 @@ def fit_least_squares(
         fits = identify_many(problems, experiments[0].least_squares, of_traces, progress)
         return deepen(problems, fits)
 
-    plain = [trace for trace, experiment in enumerate(experiments) if experiment.plain]
-    problems = pose([experiments[trace] for trace in plain], [traces[trace] for trace in plain])
-    optima = find(problems, plain) if plain else []
-    fits_by_trace = {
-        trace: TraceFit(problem, optimum, None, np.zeros(len(traces[trace][0]), dtype=bool))
-        for trace, problem, optimum in zip(plain, problems, optima, strict=True)
-    }
+    fits_by_trace: dict[int, TraceFit] = {}
+    if plain := [trace for trace, experiment in enumerate(experiments) if experiment.plain]:
+        posed = pose([experiments[trace] for trace in plain], [traces[trace] for trace in plain])
+        for trace, problem, optimum in zip(plain, posed, find(posed, plain), strict=True):
+            none = np.zeros(len(traces[trace][0]), dtype=bool)
+            fits_by_trace[trace] = TraceFit(problem, optimum, None, none)
     for trace, experiment in enumerate(experiments):
         if trace not in fits_by_trace:
             alone = partial(find, which=[trace])
