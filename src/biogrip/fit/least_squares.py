@@ -45,6 +45,8 @@ _FIRST_DAMPING, _LEAST_DAMPING = 1e-2, 1e-9
 # In e-folds. Linearised responses are wrong for longer steps, which would waste starts.
 _LONGEST_STEP = 3.0
 _MOST_ITERATIONS = 1000
+# Most steps of fair fits with a quantity held.
+_MOST_FAIR_STEPS = 40
 _STANDSTILL = 1e-8
 _LEAST_INFORMATION = 1e-300
 # Ratios of actual to predicted decrease are rounded to multiples of one over this.
@@ -137,17 +139,17 @@ def minimize(
     high: Array,
     tolerance: float,
     constraint: Constraint | None = None,
-    most_steps: int = _MOST_ITERATIONS,
-    *,
-    even: bool = False,
 ) -> Minima:
     """Minimize the sum of squares of every problem from its start.
 
     Starts and bounds, (n, n_parameters), are logarithms; equal bounds fix a parameter. A problem
     has converged when the actual and the predicted relative decrease of its sum are below the
-    tolerance. Damping is relative to the diagonal of the information or, if it is even, in units of
+    tolerance. With a constraint, fair fits tell basins, into more of which damping leads that is
+    relative to the diagonal of the information; closer ones go on with even damping, in units of
     the sum of squares.
     """
+    even = constraint is not None and tolerance < FAIR
+    most_steps = _MOST_ITERATIONS if constraint is None or even else _MOST_FAIR_STEPS
     everyone, count = np.arange(len(starts)), len(starts)
     never = np.full(count, np.inf), np.ones(count, dtype=np.int64), np.zeros(count, dtype=bool)
     minima = Minima(starts.copy(), *never)
@@ -290,9 +292,6 @@ ROUGH, FAIR, FINE = 1e-5, 1e-6, 1e-9
 chi^2 of some thousand readings to 0.01, and the optimum: far above rounding errors, and where the
 grid of `minimize`, a thousandth of a standard deviation, ends most fits."""
 
-# Most steps of fair fits with a quantity held.
-_MOST_FAIR_STEPS = 40
-
 
 def alike(problems: Sequence[TraceProblem]) -> list[IntArray]:
     """Group the indices of problems that one `LocalFits` can fit together."""
@@ -370,13 +369,7 @@ class LocalFits:
             normal = self.normal(x, trace[fit])
             return normal if constraint is None else constraint.added(normal, x, fit)
 
-        if constraint is None:
-            return minimize(objective, starts, low, high, tolerance)
-        # Fair fits tell basins, into more of which relative damping leads; closer ones go on.
-        given = objective, starts, low, high, tolerance, constraint
-        if tolerance >= FAIR:
-            return minimize(*given, most_steps=_MOST_FAIR_STEPS)
-        return minimize(*given, even=True)
+        return minimize(objective, starts, low, high, tolerance, constraint)
 
     def in_order(self, minima: Minima) -> Minima:
         """Return optima with their branches sorted by relaxation time."""
