@@ -255,7 +255,24 @@ def _free_step(gradient: Array, information: Array, damping: Array, fixed: BoolA
     scale = np.where(fixed, 0.0, 1 / np.sqrt(_size(information)))
     matrix = information * (scale[:, :, None] * scale[:, None, :])
     matrix[:, diagonal, diagonal] = np.where(fixed, 1.0, 1.0 + damping)
-    return -scale * np.linalg.solve(matrix, (scale * gradient)[:, :, None])[:, :, 0]
+    return -scale * _solved(matrix, scale * gradient)
+
+
+def _solved(matrix: Array, vector: Array) -> Array:
+    """Solve small positive definite systems, each step of elimination for all.
+
+    One that rounding makes singular has no finite step, where NumPy would raise an error for all.
+    """
+    a, b = matrix.transpose(1, 2, 0).copy(), vector.T.copy()
+    size = len(b)
+    for row in range(size - 1):
+        share = a[row + 1 :, row] / a[row, row]
+        a[row + 1 :, row + 1 :] -= share[:, None] * a[row, row + 1 :]
+        b[row + 1 :] -= share * b[row]
+    for row in range(size)[::-1]:
+        b[row] /= a[row, row]
+        b[:row] -= a[:row, row] * b[row]
+    return b.T
 
 
 def _damp(state: _State, gained: Array, predicted: Array) -> None:
