@@ -28,8 +28,10 @@ def fitted(
     given = times, response, traces
     problems = {name: pose_noisy(*given, model, level) for name, model in models.items()}
     rngs = {name: [np.random.default_rng(n) for n in range(traces)] for name in tried}
-    found = nested_fits.fit_models(problems, FEW, rngs)
-    return problems, {name: [*answers.values()] for name, answers in found.items()}
+    by_trace = [{name: of_name[n] for name, of_name in problems.items()} for n in range(traces)]
+    random = [{name: of_name[n] for name, of_name in rngs.items()} for n in range(traces)]
+    found = nested_fits.fit_models(by_trace, FEW, random)
+    return problems, {name: [answers[name] for answers in found] for name in tried}
 
 
 def assert_none_worse(problems: Problems, found: Found) -> None:
@@ -102,14 +104,14 @@ def test_elements_vanish_where_the_range_does_not_reach() -> None:
 )
 def test_what_has_vanished_starts_from_its_like(inner: str, expected: list[list[float]]) -> None:
     """A spring in front that was rigid is 3 and 100 times the other, one that was none is less."""
-    found = {inner: {0: seen(parameters=np.array([6.0, 30.0]))}}
-    starts = [*nested_fits._of_contained("zener_kelvin", found, 0, 400.0)]
+    found = {inner: seen(parameters=np.array([6.0, 30.0]))}
+    starts = [*nested_fits._of_contained("zener_kelvin", found, 400.0)]
     np.testing.assert_allclose(starts, expected)
 
 
 def test_a_simpler_model_fits_better_if_nine_digits_say_so() -> None:
-    for lower, expected in ((0.0, []), (4e-10, []), (2e-9, [("liquid_drop", "maxwell", 0)])):
-        found = {"maxwell": {0: seen(misfit=1 - lower)}, "liquid_drop": {0: seen(misfit=1.0)}}
+    for lower, expected in ((0.0, []), (4e-10, []), (2e-9, [("liquid_drop", "maxwell")])):
+        found = {"maxwell": seen(misfit=1 - lower), "liquid_drop": seen(misfit=1.0)}
         assert [*nested_fits._worse(found)] == expected
 
 

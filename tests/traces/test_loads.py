@@ -16,8 +16,8 @@ from biogrip.config.source import HOLD
 from biogrip.errors import BiogripError
 from biogrip.identify.data import trace_data
 from biogrip.identify.identify import identify
-from biogrip.identify.load_noise import smoothed
 from biogrip.identify.prepare import prepare
+from biogrip.identify.recorded_load import smoothed
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.physics.instruments import CONTROLLED
 from biogrip.physics.protocol import evaluate

@@ -14,7 +14,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from biogrip import __version__
 from biogrip.command.options import Setting
@@ -39,12 +39,14 @@ from biogrip.fit.problem import SearchRange
 from biogrip.identify.data import trace_data
 from biogrip.identify.identify import STEPS, budget, identify_alike
 from biogrip.identify.prepare import Trace, prepare
-from biogrip.identify.together import Together, identify_sample_of
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.keys import plain
 from biogrip.terminal import Progress, end_with, visible
 from biogrip.traces.columns import trace_file_problem
 from biogrip.traces.reader import form_in_words, is_usual
+
+if TYPE_CHECKING:
+    from biogrip.identify.together import Together
 
 MOST_DRAWN = 50
 """Most traces of which a page has pictures: with more it would be too large to be sent."""
@@ -345,11 +347,14 @@ def data_of(
 
 def sample_of(
     name: str, traces: Mapping[str, tuple[Diagnosis, dict[str, Any]]]
-) -> tuple[Together, dict[str, Any]]:
+) -> tuple["Together", dict[str, Any]]:
     """Identify a sample from traces that were; return it, and all that is said of it as plain data.
 
     Of each trace, by name, there are its diagnosis and its `data_of`.
     """
+    # Imported here: most traces are each of its sample.
+    from biogrip.identify.together import identify_sample_of
+
     diagnoses, said = zip(*traces.values(), strict=True)
     sample = identify_sample_of([*traces], diagnoses)
     shared = {key: it for key, it in said[0].items() if key not in _OF_ONE_TRACE}

@@ -111,8 +111,8 @@ class AnySampleFit:
     @property
     def taken(self) -> int:
         """Degrees of freedom that it takes: a time and an amplitude each, an end's time none."""
-        own = self.amplitudes > 0
-        return 2 * count_lags(own) - int(own[0]) - int(own[-1])
+        chosen = self.amplitudes > 0
+        return 2 * count_lags(chosen) - int(chosen[0]) - int(chosen[-1])
 
     @cached_property
     def left(self) -> Array:
@@ -137,9 +137,9 @@ class AnySampleFit:
 
     def left_of_readings(self) -> tuple[Array, Array]:
         """Return what it leaves of the readings, (n_samples,), and a basis of what it absorbs."""
-        trace, own = self.lags.residuals.trace, self.amplitudes > 0
+        trace, chosen = self.lags.residuals.trace, self.amplitudes > 0
         shown = trace.condensed.cleared(self._shown(self.lags.residuals))
-        residual: Array = trace.cleared - self.amplitudes[own] @ shown
+        residual: Array = trace.cleared - self.amplitudes[chosen] @ shown
         return residual, absorbed(np.vstack((shown, trace.condensed.taken)))
 
     def response(self, residuals: Residuals) -> Array:
@@ -148,8 +148,8 @@ class AnySampleFit:
 
     def _shown(self, residuals: Residuals) -> Array:
         """Return the same of unit amplitudes of the lags that it has, (n, n_samples)."""
-        own = self.amplitudes > 0
-        return residuals.of_lags(self.lags.rates[own]) * (1 / self.lags.sizes[own, None])
+        chosen = self.amplitudes > 0
+        return residuals.of_lags(self.lags.rates[chosen]) * (1 / self.lags.sizes[chosen, None])
 
 
 def count_lags(chosen: BoolArray) -> int:

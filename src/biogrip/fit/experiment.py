@@ -72,7 +72,7 @@ class Experiment:
     deeper: float = 0.0
     """By how much a tip is deeper than recorded, in the depth's unit (`in_contact`)."""
     fit_contact: bool = False
-    """True if that is fitted along (`biogrip.identify.contact`)."""
+    """True if that is fitted along (`biogrip.identify.recorded_load`)."""
     load_errors: Array | None = field(default=None, compare=False)
     """Directions in which a record that was smoothed may be off, (n_directions, n), each as long as
     its standard deviation."""
@@ -219,12 +219,6 @@ class Experiment:
         rows = self.in_noise(time_s)
         return [self.of(time_s, readings, model, condensed=rows) for readings in traces]
 
-    def rows_key(self, time_s: Array) -> Hashable:
-        """Return what the rows of a trace depend on, whose times are (n_samples,)."""
-        arrays = self.sd, self.correlation, self.record
-        held = self.phases, self.instrument, self.offset, self.drift
-        return *held, *(None if of is None else of.tobytes() for of in arrays), time_s.tobytes()
-
     def for_model(self, problem: TraceProblem, model: SampleModel) -> TraceProblem:
         """Return one of its problems posed for another model; both share rows of the trace."""
         residuals = replace(problem.residuals, model=on_clock(model, self.unit_s))
@@ -272,7 +266,9 @@ def pose(
     posed: list[TraceProblem] = []
     rows: dict[Hashable, Condensed] = {}
     for experiment, (time_s, readings) in zip(experiments, traces, strict=True):
-        key = experiment.rows_key(time_s)
+        held = experiment.phases, experiment.instrument, experiment.offset, experiment.drift
+        arrays = experiment.sd, experiment.correlation, experiment.record, time_s
+        key = *held, *(None if values is None else values.tobytes() for values in arrays)
         posed.append(experiment.of(time_s, readings, condensed=rows.get(key)))
         rows[key] = posed[-1].residuals.trace.condensed
     return posed

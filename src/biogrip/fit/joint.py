@@ -7,7 +7,7 @@ out of its own rows (`Condensed`). Of a start that is fitted along these allow t
 
 from collections.abc import Iterator, Sequence
 from copy import copy
-from dataclasses import KW_ONLY, dataclass, field, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -63,13 +63,11 @@ class StackedRows(Condensed):
 class StackedResiduals(Residuals):
     """Residuals of several traces of one sample, one after the other, each over its noise."""
 
-    noise_sd: Array = field(default_factory=lambda: np.ones(0))
-    """Standard deviation of the noise of each of the `parts`, (n_traces,)."""
-
     @property
     def pairs(self) -> list[tuple[Residuals, Any]]:
         """Residuals of each trace with the standard deviation of its noise."""
-        return [*zip(self.parts, self.noise_sd, strict=True)]
+        assert isinstance(self.trace.condensed, StackedRows)
+        return [*zip(self.parts, self.trace.condensed.noise_sd, strict=True)]
 
     @property
     def duration_s(self) -> float:
@@ -142,8 +140,8 @@ def _stacked(parts: Sequence[Residuals], noise_sd: Array, freedom: float) -> Sta
     condensed = StackedRows(first.course, every_s, none, rows=rows, noise_sd=noise_sd)
     trace = CondensedTrace(readings, condensed, None if freedom < np.inf else 1.0, 1.0)
     given = first.gripper, first.model, first.course, trace
-    own: dict[str, Any] = {"instrument": first.instrument, "parts": tuple(parts)}
-    return StackedResiduals(*given, **own, noise_sd=noise_sd, freedom=freedom)
+    instrument, every = first.instrument, tuple(parts)
+    return StackedResiduals(*given, instrument=instrument, parts=every, freedom=freedom)
 
 
 def with_uncertain_start(problem: TraceProblem, best: Array, start_sd: float) -> TraceProblem:

@@ -45,6 +45,8 @@ _FIRST_DAMPING, _LEAST_DAMPING = 1e-2, 1e-9
 # In e-folds. Linearised responses are wrong for longer steps, which would waste starts.
 _LONGEST_STEP = 3.0
 _MOST_ITERATIONS = 1000
+# Most steps of fair fits with a quantity held.
+_MOST_FAIR_STEPS = 40
 _STANDSTILL = 1e-8
 _LEAST_INFORMATION = 1e-300
 # Ratios of actual to predicted decrease are rounded to multiples of one over this.
@@ -137,17 +139,17 @@ def minimize(
     high: Array,
     tolerance: float,
     constraint: Constraint | None = None,
-    most_steps: int = _MOST_ITERATIONS,
-    *,
-    even: bool = False,
 ) -> Minima:
     """Minimize the sum of squares of every problem from its start.
 
     Starts and bounds, (n, n_parameters), are logarithms; equal bounds fix a parameter. A problem
     has converged when the actual and the predicted relative decrease of its sum are below the
-    tolerance. Damping is relative to the diagonal of the information or, if it is even, in units of
+    tolerance. With a constraint, fair fits tell basins, into more of which damping leads that is
+    relative to the diagonal of the information; closer ones go on with even damping, in units of
     the sum of squares.
     """
+    even = constraint is not None and tolerance < FAIR
+    most_steps = _MOST_ITERATIONS if constraint is None or even else _MOST_FAIR_STEPS
     everyone, count = np.arange(len(starts)), len(starts)
     never = np.full(count, np.inf), np.ones(count, dtype=np.int64), np.zeros(count, dtype=bool)
     minima = Minima(starts.copy(), *never)
@@ -253,7 +255,24 @@ def _free_step(gradient: Array, information: Array, damping: Array, fixed: BoolA
     scale = np.where(fixed, 0.0, 1 / np.sqrt(_size(information)))
     matrix = information * (scale[:, :, None] * scale[:, None, :])
     matrix[:, diagonal, diagonal] = np.where(fixed, 1.0, 1.0 + damping)
-    return -scale * np.linalg.solve(matrix, (scale * gradient)[:, :, None])[:, :, 0]
+    return -scale * _solved(matrix, scale * gradient)
+
+
+def _solved(matrix: Array, vector: Array) -> Array:
+    """Solve small positive definite systems, each step of elimination for all.
+
+    One that rounding makes singular has no finite step, where NumPy would raise an error for all.
+    """
+    a, b = matrix.transpose(1, 2, 0).copy(), vector.T.copy()
+    size = len(b)
+    for row in range(size - 1):
+        share = a[row + 1 :, row] / a[row, row]
+        a[row + 1 :, row + 1 :] -= share[:, None] * a[row, row + 1 :]
+        b[row + 1 :] -= share * b[row]
+    for row in range(size)[::-1]:
+        b[row] /= a[row, row]
+        b[:row] -= a[:row, row] * b[row]
+    return b.T
 
 
 def _damp(state: _State, gained: Array, predicted: Array) -> None:
@@ -289,9 +308,6 @@ ROUGH, FAIR, FINE = 1e-5, 1e-6, 1e-9
 """Relative decrease of the sum of squares below which a fit has converged, to tell basins, to give
 chi^2 of some thousand readings to 0.01, and the optimum: far above rounding errors, and where the
 grid of `minimize`, a thousandth of a standard deviation, ends most fits."""
-
-# Most steps of fair fits with a quantity held.
-_MOST_FAIR_STEPS = 40
 
 
 def alike(problems: Sequence[TraceProblem]) -> list[IntArray]:
@@ -370,13 +386,7 @@ class LocalFits:
             normal = self.normal(x, trace[fit])
             return normal if constraint is None else constraint.added(normal, x, fit)
 
-        if constraint is None:
-            return minimize(objective, starts, low, high, tolerance)
-        # Fair fits tell basins, into more of which relative damping leads; closer ones go on.
-        given = objective, starts, low, high, tolerance, constraint
-        if tolerance >= FAIR:
-            return minimize(*given, most_steps=_MOST_FAIR_STEPS)
-        return minimize(*given, even=True)
+        return minimize(objective, starts, low, high, tolerance, constraint)
 
     def in_order(self, minima: Minima) -> Minima:
         """Return optima with their branches sorted by relaxation time."""

@@ -17,13 +17,14 @@ References
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 import biogrip.levels as levels
-from biogrip.arrays import Array, BoolArray
+from biogrip.arrays import Array, BoolArray, parts
 from biogrip.digits import counted, plain
 from biogrip.fit.least_squares import LeastSquaresSettings, fit_from, identify_many, refit
 from biogrip.fit.problem import Fit, TraceProblem, silent
@@ -42,10 +43,10 @@ _TRIED_TIMES = 6
 # Models that are equivalent in other parameters may improve one another in turn.
 _MOST_REFITS = 3
 
-Fits = dict[str, dict[int, Fit]]
-"""Fits by candidate and index of the trace."""
+Fits = dict[str, Fit]
+"""Fits of a trace by candidate."""
 Worth = Callable[[str, int, Fits], bool]
-"""Tells of a candidate, a trace, and the fits so far, if it is worth another."""
+"""Tells of a candidate, a trace, and its fits so far, if it is worth another."""
 
 
 def deepen(problems: Sequence[TraceProblem], fits: Sequence[Fit]) -> list[Fit]:
@@ -61,81 +62,78 @@ def deepen(problems: Sequence[TraceProblem], fits: Sequence[Fit]) -> list[Fit]:
     pairs = [(names.index(k), names.index(c)) for k, c in dampers.items() if c in names]
     if not pairs or model.power_law:
         return [*fits]
-    springs = [spring for spring, _ in pairs]
-    starts = np.repeat(np.log([fit.parameters for fit in fits]), len(pairs) * _TRIED_TIMES, axis=0)
-    every = starts.reshape(len(fits), len(pairs), _TRIED_TIMES, len(names))
-    for trace, problem in enumerate(problems):
-        times = problem.residuals.trace.time_s
-        tried = np.log(np.geomspace(np.diff(times).min(), times[-1], _TRIED_TIMES))
-        for place, (spring, damper) in enumerate(pairs):
-            every[trace, place, :, spring] = np.mean(every[trace, place, 0, springs])
-            every[trace, place, :, damper] = every[trace, place, 0, spring] + tried
-        every[trace] = np.clip(every[trace], problem.low, problem.high)
-    which = np.repeat(np.arange(len(fits)), len(pairs) * _TRIED_TIMES)
-    ends = fit_from([problems[trace] for trace in which.tolist()], starts, roughly=True)
-    best = [*fits]
-    for trace, problem in enumerate(problems):
-        of_trace = ends[which == trace]
-        lowest = int(np.argmin(of_trace.misfit.astype(np.float32)))
-        if _is_noticeably_lower(float(of_trace.misfit[lowest]), best[trace].misfit, problem):
-            best[trace] = _better_from(best[trace], problem, of_trace.x[lowest])
-    return best
+    springs, tries, starts = [spring for spring, _ in pairs], len(pairs) * _TRIED_TIMES, []
+    for problem, fit in zip(problems, fits, strict=True):
+        time_s, best = problem.residuals.trace.time_s, np.log(fit.parameters)
+        tried = np.log(np.geomspace(np.diff(time_s).min(), time_s[-1], _TRIED_TIMES))
+        for (spring, damper), log_time in product(pairs, tried):
+            start = best.copy()
+            start[spring] = np.mean(best[springs])
+            start[damper] = start[spring] + log_time
+            starts.append(np.clip(start, problem.low, problem.high))
+    posed = [problem for problem in problems for _ in range(tries)]
+    ends, deeper = fit_from(posed, np.array(starts), roughly=True), []
+    for problem, fit, some in zip(problems, fits, parts(len(posed), tries), strict=True):
+        lowest = some.start + int(np.argmin(ends.misfit[some].astype(np.float32)))
+        is_lower = _is_noticeably_lower(float(ends.misfit[lowest]), fit.misfit, problem)
+        deeper.append(_better_from(fit, problem, ends.x[lowest]) if is_lower else fit)
+    return deeper
 
 
 def fit_models(
-    problems: Mapping[str, Sequence[TraceProblem]],
+    problems: Sequence[Mapping[str, TraceProblem]],
     settings: LeastSquaresSettings,
-    rngs: Mapping[str, Sequence[np.random.Generator]],
+    rngs: Sequence[Mapping[str, np.random.Generator]],
     done: Callable[[], None] = lambda: None,
-    near: Mapping[str, Array] | None = None,
+    near: Sequence[Mapping[str, Array]] | None = None,
     worth: Worth = lambda name, trace, fits: True,
-) -> Fits:
-    """Fit nested models to traces by least squares; return the best fits, by model and trace.
+) -> list[Fits]:
+    """Fit nested models to traces by least squares; return the best fits of each trace.
 
-    By candidate, the problems of the same traces are given, a random generator for each, and
-    additional starts, (n_traces, n_parameters); `done` is called after every model. Parameters
-    found may be zero or infinite. A fit worse than a nested model's within its own range has not
-    converged. Models are fitted in the order of their numbers of parameters, each to the traces
-    that are `worth` it.
+    Of each trace, problems by candidate are given, random generators, and additional starts,
+    (n_parameters,); `done` is called after every model. Parameters found may be zero or infinite. A
+    fit worse than a nested model's within its own range has not converged. Models are fitted in the
+    order of their numbers of parameters, each to the traces that are `worth` it.
     """
-    fits: Fits = {}
-    for name in sorted(problems, key=_cost):
-        which = [trace for trace in range(len(problems[name])) if worth(name, trace, fits)]
-        further = []
-        for trace in which:
-            problem = problems[name][trace]
-            of_contained = _of_contained(name, fits, trace, problem.residuals.duration_s)
-            points = [within_range(start, problem) for start in of_contained]
-            points += [near[name][trace]] if near and name in near else []
+    fits: list[Fits] = [{} for _ in problems]
+    for name in sorted({name for of_trace in problems for name in of_trace}, key=_cost):
+        which = [
+            trace
+            for trace, of_trace in enumerate(problems)
+            if name in of_trace and worth(name, trace, fits[trace])
+        ]
+        posed, further = [problems[trace][name] for trace in which], []
+        for trace, problem in zip(which, posed, strict=True):
+            starts = _of_contained(name, fits[trace], problem.residuals.duration_s)
+            points = [within_range(start, problem) for start in starts]
+            points += [near[trace][name]] if near and name in near[trace] else []
             further.append(np.reshape(points, (-1, len(problem.low))))
         budget, (fewer, few) = settings, _FEWER_FOR_POWER_LAWS
         if CANDIDATES[name].model.power_law:
             budget = LeastSquaresSettings(-(-budget.candidates // fewer), -(-budget.starts // few))
-        fits[name] = {}
         if which:
-            posed, random = (
-                [problems[name][trace] for trace in which],
-                [rngs[name][trace] for trace in which],
-            )
-            of_name = deepen(posed, identify_many(posed, budget, random, silent, further))
-            fits[name] = dict(zip(which, of_name, strict=True))
+            random = [rngs[trace][name] for trace in which]
+            best = deepen(posed, identify_many(posed, budget, random, silent, further))
+            for trace, fit in zip(which, best, strict=True):
+                fits[trace][name] = fit
         done()
-    _fit_again(problems, fits)
-    _take_simpler(problems, fits)
-    return {name: fits[name] for name in problems}
+    for trace, of_trace in enumerate(problems):
+        _let_none_be_worse(of_trace, fits[trace])
+        fits[trace] = {name: fits[trace][name] for name in of_trace if name in fits[trace]}
+    return fits
 
 
-def _cost(name: str) -> tuple[int, bool]:
+def _cost(name: str) -> tuple[int, bool, int]:
     """Return what models are fitted in the order of: parameters, and if it is a power law."""
     model = CANDIDATES[name].model
-    return len(model.names), model.power_law
+    return len(model.names), model.power_law, [*CANDIDATES].index(name)
 
 
-def _of_contained(name: str, fits: Fits, trace: int, longest_s: float) -> Iterator[Array]:
+def _of_contained(name: str, fits: Fits, longest_s: float) -> Iterator[Array]:
     """Yield nested optima as starts; what has vanished is noticeable, or hardly noticeable."""
     kinds = np.array([parameter.kind for parameter in CANDIDATES[name].model.parameters])
-    for inner in different_in(name, [other for other in fits if trace in fits[other]]):
-        parameters = as_richer(name, inner, fits[inner][trace].parameters)
+    for inner in different_in(name, [*fits]):
+        parameters = as_richer(name, inner, fits[inner].parameters)
         gone = (kinds != "exponent") & ((parameters == 0) | ~np.isfinite(parameters))
         for times in _AWAY_FROM_USUAL if gone.any() else (1.0,):
             start = parameters.copy()
@@ -154,39 +152,32 @@ def _usual(kind: str, kinds: Array, values: Array, there: BoolArray, longest_s: 
     return float(np.exp(np.mean(np.log(others)))) * relaxation_s
 
 
-def _fit_again(problems: Mapping[str, Sequence[TraceProblem]], fits: Fits) -> None:
-    """Fit again, in place, models that fit worse than a nested one within their range."""
+def _let_none_be_worse(problems: Mapping[str, TraceProblem], fits: Fits) -> None:
+    """Let no model of a trace fit worse, in place, than one that is nested in it.
+
+    Within its range it is fitted again. Else the better optimum of the nested model is its result.
+    """
     for _ in range(_MOST_REFITS):
-        news = False
-        for name, inner, trace in _worse(fits):
-            problem = problems[name][trace]
-            parameters = as_richer(name, inner, fits[inner][trace].parameters)
+        before = dict(fits)
+        for name, inner in _worse(fits):
+            parameters, problem = as_richer(name, inner, fits[inner].parameters), problems[name]
             if is_within(parameters, problem):
-                before = fits[name][trace]
-                fits[name][trace] = _better_from(before, problem, within_range(parameters, problem))
-                news |= fits[name][trace] is not before
-        if not news:
+                fits[name] = _better_from(fits[name], problem, within_range(parameters, problem))
+        if all(fits[name] is before[name] for name in fits):
             break
+    for name, inner in _worse(fits):
+        simpler, parameters = fits[inner], as_richer(name, inner, fits[inner].parameters)
+        reached = simpler.converged and not is_within(parameters, problems[name])
+        fit = replace(fits[name], parameters=parameters, misfit=simpler.misfit)
+        fits[name] = replace(fit, converged=reached)
 
 
-def _take_simpler(problems: Mapping[str, Sequence[TraceProblem]], fits: Fits) -> None:
-    """Replace, in place, a richer model's result by a nested model's better optimum."""
-    for name, inner, trace in _worse(fits):
-        simpler = fits[inner][trace]
-        parameters = as_richer(name, inner, simpler.parameters)
-        reached = simpler.converged and not is_within(parameters, problems[name][trace])
-        fits[name][trace] = replace(
-            fits[name][trace], parameters=parameters, misfit=simpler.misfit, converged=reached
-        )
-
-
-def _worse(fits: Fits) -> Iterator[tuple[str, str, int]]:
-    """Yield model, nested model and trace where the nested one fits better; simple ones first."""
+def _worse(fits: Fits) -> Iterator[tuple[str, str]]:
+    """Yield model and nested model where the nested one fits better; simple ones first."""
     for name in fits:
         for inner in filter(fits.__contains__, contained(name)):
-            for trace in filter(fits[inner].__contains__, fits[name]):
-                if _digits(fits[inner][trace].misfit) < _digits(fits[name][trace].misfit):
-                    yield name, inner, trace
+            if _digits(fits[inner].misfit) < _digits(fits[name].misfit):
+                yield name, inner
 
 
 def _is_noticeably_lower(misfit: float, than: float, problem: TraceProblem) -> bool:

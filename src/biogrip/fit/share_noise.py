@@ -12,7 +12,6 @@ if they are clearly likelier.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -81,49 +80,22 @@ def _least(sizes: Array, rest: Array, share: float) -> float:
     """Return the least standard deviation, from the smallest readings."""
     few = max(_FEWEST, int(_SMALL * len(sizes)))
     smallest = np.argsort(sizes, kind="stable")[:few]
-    scatter, size = (np.sqrt(np.mean(own[smallest] ** 2)) for own in (rest, sizes))
+    scatter, size = (np.sqrt(np.mean(values[smallest] ** 2)) for values in (rest, sizes))
     if scatter <= _EXCESS * share * size:
         return share * float(np.median(sizes[smallest]))
     return float(scatter)
 
 
-@dataclass(frozen=True, eq=False)
 class SweptNoise:
-    """Noise of a sweep's readings."""
-
-    sd: Array
-    """Standard deviations of the readings, (n_samples,)."""
-    correlation: Array | None
-    """Of both moduli at each frequency, ascending, (n_frequencies,); None if they have none."""
-    words: str
-    """Sizes in words."""
-
-
-def estimate_swept_noise(
-    places: Array, readings: Array, sizes: Sequence[float] | None = None, more: float = 0.0
-) -> SweptNoise:
-    """Estimate the noise of a sweep from its scatter; `more` is added to it, squared.
-
-    Sizes, if they are known, are the share of each modulus or, if there are two, that of the
-    amplitude and the error of the phase in rad. Places and readings, (n_samples,), are of both
-    moduli or of one.
-    """
-    if sizes is not None:
-        return _noise_about(_Smooth(places, readings, len(sizes) > 1, sizes), more)
-    both = len({*is_storage(places).tolist()}) > 1
-    tried = [_Smooth(places, readings, polar, None) for polar in (True, False)[not both :]]
-    few = [smooth for smooth in tried if smooth.free < max(_FEWEST_FREE, len(readings) / 2)]
-    odds = {
-        smooth: smooth.deviance - levels.LIKELIER * smooth.polar for smooth in few[-1:] or tried
-    }
-    return _noise_about(min(odds, key=lambda smooth: odds[smooth]), more)
-
-
-class _Smooth:
-    """The linear sample nearest to moduli whose errors have components of one size each."""
+    """Noise about the linear sample nearest to moduli, whose components have one size each."""
 
     def __init__(
-        self, places: Array, readings: Array, polar: bool, sizes: Sequence[float] | None
+        self,
+        places: Array,
+        readings: Array,
+        polar: bool,
+        sizes: Sequence[float] | None,
+        more: float,
     ) -> None:
         self.places, self.polar = places, polar
         family = moduli_of(lag_course(SWEEP, _spread_swept_lags(places), places), places)
@@ -136,12 +108,19 @@ class _Smooth:
             rows = (weights * rows).reshape(len(rows), -1)
             amplitudes, _ = fit_responses(rows[-1], rows[:-1])
             taken = np.sum(absorbed(rows[:-1][amplitudes > 0]) ** 2, axis=0).reshape(read.shape)
-            self.moduli = np.tensordot(amplitudes, family, 1)
+            moduli = np.tensordot(amplitudes, family, 1)
             self.free = len(readings) - 2 * count_lags(amplitudes > 0)
-            self.parts = parts = _components(self.moduli, polar)
-            self.apart = np.einsum("ijn,jn->in", parts, read - self.moduli)
+            self.parts = parts = _components(moduli, polar)
+            self.apart = np.einsum("ijn,jn->in", parts, read - moduli)
             self.sizes = self._sizes(read, taken, weights > 0, sizes)[:, None]
             weights = (np.abs(self.apart) < _FAR_OUT * self.sizes) / self.sizes
+        back = np.linalg.inv(parts.T).transpose(0, 2, 1) * self.sizes[:, 0]
+        covariance = back @ back.transpose(0, 2, 1) + more**2 * np.eye(len(read))
+        sd = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)).T
+        self.sd = places_of(sd, places)
+        """Standard deviations of the readings, (n_samples,)."""
+        self.correlation = covariance[:, 0, -1] / (sd[0] * sd[-1]) if polar else None
+        """Of both moduli at each frequency, ascending, (n_frequencies,); None if they have none."""
 
     def _sizes(
         self, read: Array, taken: Array, used: BoolArray, known: Sequence[float] | None
@@ -163,6 +142,18 @@ class _Smooth:
         return np.maximum(sizes, max(_LEAST_SIZES[0] * float(sizes.max()), _ROUNDING))
 
     @property
+    def words(self) -> str:
+        """Sizes in words."""
+        sizes = [f"{plain(100 * size, 2)} %" for size in self.sizes[:, 0]]
+        if self.polar:
+            degrees = plain(np.degrees(self.sizes[1, 0]), 2)
+            return f"{sizes[0]} of the amplitude and {degrees} degrees"
+        stored = is_storage(self.places)
+        names = ["storage"] * bool(stored.any()) + ["loss"] * bool((~stored).any())
+        pairs = zip(sizes, names, strict=True)
+        return " and ".join(f"{size} of the {name} modulus" for size, name in pairs)
+
+    @property
     def deviance(self) -> float:
         """Deviance of second differences by Student's distribution."""
         total = -float(np.sum(np.log(np.abs(np.linalg.det(self.parts.T)))))
@@ -178,6 +169,23 @@ class _Smooth:
         return total
 
 
+def estimate_swept_noise(
+    places: Array, readings: Array, sizes: Sequence[float] | None = None, more: float = 0.0
+) -> SweptNoise:
+    """Estimate the noise of a sweep from its scatter; `more` is added to it, squared.
+
+    Sizes, if they are known, are the share of each modulus or, if there are two, that of the
+    amplitude and the error of the phase in rad. Places and readings, (n_samples,), are of both
+    moduli or of one.
+    """
+    if sizes is not None:
+        return SweptNoise(places, readings, len(sizes) > 1, sizes, more)
+    both = len({*is_storage(places).tolist()}) > 1
+    tried = [SweptNoise(places, readings, polar, None, more) for polar in (True, False)[not both :]]
+    few = [noise for noise in tried if noise.free < max(_FEWEST_FREE, len(readings) / 2)]
+    return min(few[-1:] or tried, key=lambda noise: noise.deviance - levels.LIKELIER * noise.polar)
+
+
 def _components(moduli: Array, polar: bool) -> Array:
     """Return what makes components of errors of moduli, (n_parts, n_moduli, n_frequencies)."""
     least = _LEAST_SIZES[1] * np.linalg.norm(moduli, axis=0)
@@ -186,27 +194,6 @@ def _components(moduli: Array, polar: bool) -> Array:
         return np.einsum("ij,jn->ijn", np.eye(len(moduli)), 1 / moduli)
     storage, loss = moduli / np.sum(moduli**2, axis=0)
     return np.array([[storage, loss], [-loss, storage]])
-
-
-def _noise_about(smooth: _Smooth, more: float) -> SweptNoise:
-    """Return the covariance of moduli whose errors have these components."""
-    back = np.linalg.inv(smooth.parts.T).transpose(0, 2, 1) * smooth.sizes[:, 0]
-    covariance = back @ back.transpose(0, 2, 1) + more**2 * np.eye(len(smooth.moduli))
-    sd = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)).T
-    correlation = covariance[:, 0, -1] / (sd[0] * sd[-1]) if smooth.polar else None
-    return SweptNoise(places_of(sd, smooth.places), correlation, _sizes_in_words(smooth))
-
-
-def _sizes_in_words(smooth: _Smooth) -> str:
-    percents = [f"{plain(100 * size, 2)} %" for size in smooth.sizes[:, 0]]
-    if smooth.polar:
-        return (
-            f"{percents[0]} of the amplitude and {plain(np.degrees(smooth.sizes[1, 0]), 2)} degrees"
-        )
-    stored = is_storage(smooth.places)
-    names = ["storage"] * bool(stored.any()) + ["loss"] * bool((~stored).any())
-    pairs = zip(percents, names, strict=True)
-    return " and ".join(f"{percent} of the {name} modulus" for percent, name in pairs)
 
 
 def _spread_swept_lags(places: Array) -> list[float]:

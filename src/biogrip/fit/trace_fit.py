@@ -51,11 +51,10 @@ def gripper_functions(experiment: Experiment, time_s: Array, parameters: Array) 
         gripper, torque = experiment.gripper, experiment.torque
         if part == "torque":
             torque = torque.times(1 + error)
-        elif part == "steps":
-            later_s = np.array([error if key == number else 0.0 for number in errors_s])
+        elif part.endswith("steps"):
+            alone = [float(step == key) for step in errors_s]
+            later_s = error * np.array(alone if part == "steps" else [*errors_s.values()])
             torque = experiment.with_steps_later(later_s).torque
-        elif part == "all steps":
-            torque = experiment.with_steps_later(error * np.array([*errors_s.values()])).torque
         elif part == "gripper":
             gripper = replace(gripper, **{key: getattr(gripper, key) + error})
         elif part:
@@ -241,13 +240,12 @@ def fit_least_squares(
         fits = identify_many(problems, experiments[0].least_squares, of_traces, progress)
         return deepen(problems, fits)
 
-    plain = [trace for trace, experiment in enumerate(experiments) if experiment.plain]
-    problems = pose([experiments[trace] for trace in plain], [traces[trace] for trace in plain])
-    optima = find(problems, plain) if plain else []
-    fits_by_trace = {
-        trace: TraceFit(problem, optimum, None, np.zeros(len(traces[trace][0]), dtype=bool))
-        for trace, problem, optimum in zip(plain, problems, optima, strict=True)
-    }
+    fits_by_trace: dict[int, TraceFit] = {}
+    if plain := [trace for trace, experiment in enumerate(experiments) if experiment.plain]:
+        posed = pose([experiments[trace] for trace in plain], [traces[trace] for trace in plain])
+        for trace, problem, optimum in zip(plain, posed, find(posed, plain), strict=True):
+            none = np.zeros(len(traces[trace][0]), dtype=bool)
+            fits_by_trace[trace] = TraceFit(problem, optimum, None, none)
     for trace, experiment in enumerate(experiments):
         if trace not in fits_by_trace:
             alone = partial(find, which=[trace])

@@ -35,6 +35,7 @@ References
 """
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -100,10 +101,10 @@ def compute_growth(residual: Array, readings: Array, rounding: float = 0.0) -> A
         return np.ones(len(residual))
     from scipy.optimize import minimize_scalar
 
-    found = minimize_scalar(
+    best = minimize_scalar(
         lambda odds: _deviance(apart, _growth(odds, size)), bounds=(_GROWTH_LEAST, _GROWTH_MOST)
     )
-    return _growth(float(found.x), size)
+    return _growth(float(best.x), size)
 
 
 def growth_left(residuals: Residuals, log_parameters: Array) -> Array:
@@ -334,17 +335,11 @@ class NoiseModelLikelihood:
         from scipy.optimize import minimize
 
         starts = [_logarithms(near)] if near is not None else self._best_of_each()
-        found = [
-            minimize(
-                self._deviance,
-                np.clip(start, *np.transpose(self._bounds)),
-                method="L-BFGS-B",
-                bounds=self._bounds,
-                options={"eps": _STEP, "ftol": _CONVERGED},
-            )
-            for start in starts
-        ]
-        return _noise_model(min(found, key=lambda each: float(each.fun)).x)
+        steps = {"eps": _STEP, "ftol": _CONVERGED}
+        given = {"method": "L-BFGS-B", "bounds": self._bounds, "options": steps}
+        clipped = [np.clip(start, *np.transpose(self._bounds)) for start in starts]
+        ends = [minimize(self._deviance, start, **given) for start in clipped]
+        return _noise_model(min(ends, key=lambda end: float(end.fun)).x)
 
     def freedom(self, noise_model: NoiseModel, sensitivity: Array, nuisance: Array) -> float:
         """Compute the degrees of freedom of the least known variance of a parameter.
@@ -412,18 +407,16 @@ class NoiseModelLikelihood:
     def _best_of_each(self) -> list[Array]:
         """Return the best points of a grid with more ar1, more 1/f noise, and a random walk."""
         shortest, longest = self._bounds[1]
+        slow = [(odds, _LEAST) for odds in _ODDS] + [(_LEAST, odds) for odds in _ODDS[1:]]
+        growing = [()] if self._growing is None else [(odds,) for odds in _GROWING]
         tried = [
-            np.array([ar1, shortest + place * (longest - shortest), *slow, *growing])
-            for ar1 in _ODDS
-            for place in (_PLACES if ar1 > _LEAST else _PLACES[:1])
-            for slow in [
-                *((odds, _LEAST) for odds in _ODDS),
-                *((_LEAST, odds) for odds in _ODDS[1:]),
-            ]
-            for growing in ([()] if self._growing is None else [(odds,) for odds in _GROWING])
+            np.array([ar1, shortest + place * (longest - shortest), *of_slow, *of_growing])
+            for ar1, place, of_slow, of_growing in product(_ODDS, _PLACES, slow, growing)
+            if ar1 > _LEAST or place == _PLACES[0]
         ]
         largest = [int(np.argmax((x[2], x[0], x[3]))) for x in tried]
-        sides = [[x for x, own in zip(tried, largest, strict=True) if own == it] for it in range(3)]
+        pairs = [*zip(tried, largest, strict=True)]
+        sides = [[x for x, most in pairs if most == side] for side in range(3)]
         return [min(side, key=self._deviance) for side in sides]
 
 

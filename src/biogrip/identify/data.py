@@ -149,25 +149,25 @@ def _fitted_along(
     diagnosis: Diagnosis, recording: Recording, experiment: Experiment
 ) -> dict[str, Any]:
     """Return onset, offset and drift of the instrument in the best fit, as far as fitted."""
-    found: dict[str, Any] = {}
+    terms: dict[str, Any] = {}
     if experiment.fit_start:
-        found["onset_s"] = float(recording.onset_s or 0.0)
+        terms["onset_s"] = float(recording.onset_s or 0.0)
     if diagnosis.onset_limits_s:
-        found["onset_limits_s"] = [found["onset_s"] + end_s for end_s in diagnosis.onset_limits_s]
+        terms["onset_limits_s"] = [terms["onset_s"] + end_s for end_s in diagnosis.onset_limits_s]
     if experiment.fit_contact:
-        from biogrip.identify.contact import depth_limits
+        from biogrip.identify.recorded_load import depth_limits
 
         value, *limits = depth_limits(diagnosis)
-        found |= {"contact_m": value, "contact_limits_m": limits}
+        terms |= {"contact_m": value, "contact_limits_m": limits}
     if not experiment.offset_and_drift:
-        return found
+        return terms
     time_s, measured = recording.time_s, recording.readings
     network = experiment.searched.network(np.exp(diagnosis.likelihood.best))
     simulated = simulated_response(experiment.gripper, network, experiment.torque, time_s)[0]
     added = within(experiment.nuisance(time_s), measured - simulated, experiment.sd)
     slope = float((added[-1] - added[0]) / (time_s[-1] - time_s[0]))
     if experiment.offset:
-        found["offset_rad"] = float(added[0] - slope * time_s[0])
+        terms["offset_rad"] = float(added[0] - slope * time_s[0])
     if experiment.drift:
-        found["drift_rad_per_s"] = slope
-    return found
+        terms["drift_rad_per_s"] = slope
+    return terms

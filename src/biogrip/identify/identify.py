@@ -19,6 +19,7 @@ are fitted together; the result of a trace is the same, to the last bit, in any 
 
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -137,7 +138,7 @@ def _notes_on_trace(judged: Diagnosis, on_fit: list[Note], opinion: list[Note]) 
     start: list[Note] = []
     if recording.read.has_tip:
         # Imported here: most traces are of no tip.
-        from biogrip.identify.contact import notes_on_contact
+        from biogrip.identify.recorded_load import notes_on_contact
 
         start += notes_on_contact(judged)
     start = start or notes_on_start(recording, experiment, judged)
@@ -189,14 +190,12 @@ def _compare_models(diagnoses: Sequence[Diagnosis]) -> list[Diagnosis]:
     models = nested_fits.FittedModels(diagnoses[0].identified[1].sample.candidate)
     compared = [replace(diagnosis, models=models) for diagnosis in diagnoses]
     names = [*map(_candidates, compared)]
-    while left := dict.fromkeys(filter(None, names)):
-        for some in left:
-            which = [trace for trace, of_trace in enumerate(names) if of_trace == some]
-            tried = _tried([compared[trace] for trace in which], some)
-            for trace, models in zip(which, tried, strict=True):
-                compared[trace] = replace(compared[trace], models=models)
-                more = _one_branch_more(compared[trace], models)
-                names[trace] = (*some, more) if more else ()
+    while which := [trace for trace, of_trace in enumerate(names) if of_trace]:
+        tried = _tried([compared[trace] for trace in which], [names[trace] for trace in which])
+        for trace, models in zip(which, tried, strict=True):
+            compared[trace] = replace(compared[trace], models=models)
+            more = _one_branch_more(compared[trace], models)
+            names[trace] = (*names[trace], more) if more else ()
     return [*map(_judge_again, compared)]
 
 
@@ -208,34 +207,36 @@ def _one_branch_more(diagnosis: Diagnosis, models: nested_fits.FittedModels) -> 
     return name if len(CANDIDATES[name].model.names) <= _most(diagnosis) else None
 
 
-def _tried(diagnoses: Sequence[Diagnosis], names: Sequence[str]) -> list[nested_fits.FittedModels]:
-    """Fit sample models to traces that were diagnosed by the chosen one."""
-    experiments = [diagnosis.identified[1] for diagnosis in diagnoses]
-    posed = [diagnosis.likelihood.problem for diagnosis in diagnoses]
-    chosen, problems, streams = experiments[0].sample.candidate, {}, {}
-    for name in names:
-        pairs, model = zip(experiments, posed, strict=True), CANDIDATES[name].model
-        problems[name] = [experiment.for_model(problem, model) for experiment, problem in pairs]
-        streams[name] = [experiment.stream(f"model {name}") for experiment in experiments]
-    near = {chosen: np.array([diagnosis.likelihood.best for diagnosis in diagnoses])}
-    given, growths = (problems, experiments[0].least_squares, streams), [*map(_growth, diagnoses)]
-    fits = nested_fits.fit_models(*given, near=near, worth=_worth(diagnoses, growths))
-    every = []
-    for place, diagnosis in enumerate(diagnoses):
-        of_trace = {name: problems[name][place] for name in names if place in fits[name]}
-        answers = {name: fits[name][place] for name in of_trace}
-        if experiments[place].fit_start and not experiments[place].coloured:
-            answers = _at_their_onsets(diagnosis, of_trace, answers)
-        misfits = [_misfit(growths[place], of_trace[name], answers[name]) for name in answers]
-        tried = nested_fits.ranked([*answers], misfits, posed[place].residuals.samples)
-        spared = tuple(name for name in names if name not in answers)
-        models = nested_fits.FittedModels(chosen, tried, answers, spared=spared)
-        best = models.preferred or chosen
+def _tried(
+    diagnoses: Sequence[Diagnosis], names: Sequence[Sequence[str]]
+) -> list[nested_fits.FittedModels]:
+    """Fit sample models of some names to each of several traces, diagnosed by the chosen one."""
+    first, problems, rngs, near = diagnoses[0].identified[1], [], [], []
+    for diagnosis, of_trace in zip(diagnoses, names, strict=True):
+        experiment, likelihood = diagnosis.identified[1], diagnosis.likelihood
+        for_model = partial(experiment.for_model, likelihood.problem)
+        problems.append({name: for_model(CANDIDATES[name].model) for name in of_trace})
+        rngs.append({name: experiment.stream(f"model {name}") for name in of_trace})
+        near.append({experiment.sample.candidate: likelihood.best})
+    growths, budget = [*map(_growth, diagnoses)], first.least_squares
+    worth = _worth(diagnoses, growths)
+    fits = nested_fits.fit_models(problems, budget, rngs, near=near, worth=worth)
+    fitted = []
+    for diagnosis, posed, growth, answers in zip(diagnoses, problems, growths, fits, strict=True):
+        experiment, residuals = diagnosis.identified[1], diagnosis.likelihood.problem.residuals
+        if experiment.fit_start and not experiment.coloured:
+            answers = _at_their_onsets(diagnosis, posed, answers)
+        misfits = [_misfit(growth, posed[name], answer) for name, answer in answers.items()]
+        tried = nested_fits.ranked([*answers], misfits, residuals.samples)
+        spared = tuple(name for name in posed if name not in answers)
+        chosen = experiment.sample.candidate
+        compared = nested_fits.FittedModels(chosen, tried, answers, spared=spared)
+        best = compared.preferred or chosen
         # What a fit leaves that is not rejected has been looked at.
         adequate = best == chosen and diagnosis.status != REJECTED
-        adequate = adequate or _leaves_noise(of_trace[best], answers[best], diagnosis)
-        every.append(replace(models, adequate=adequate))
-    return every
+        adequate = adequate or _leaves_noise(posed[best], answers[best], diagnosis)
+        fitted.append(replace(compared, adequate=adequate))
+    return fitted
 
 
 def _at_their_onsets(
@@ -277,7 +278,7 @@ def _worth(diagnoses: Sequence[Diagnosis], growths: Sequence[Array | None]) -> n
         likelihood, limit = diagnoses[trace].likelihood, least[trace]
         chosen = diagnoses[trace].identified[1].sample.candidate
         misfits = {chosen: likelihood.misfit}
-        misfits |= {other: fits[other][trace].misfit for other in fits if trace in fits[other]}
+        misfits |= {other: fit.misfit for other, fit in fits.items()}
         if name == chosen or limit > min(misfits.values()) * (1 + _ROUNDING):
             return True
         sizes = [len(CANDIDATES[tried].model.names) for tried in (name, *misfits)]

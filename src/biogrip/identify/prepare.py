@@ -84,16 +84,16 @@ def prepare(recording: Recording, experiment: Experiment) -> Trace:
     """
     # Imported here, as below: of most traces no load was recorded.
     if experiment.record is not None:
-        from biogrip.identify.load_noise import with_its_steps, without_noise
+        from biogrip.identify.recorded_load import with_its_steps, without_noise
 
-        experiment, recording = with_its_steps(experiment, recording)
-    experiment, recording = _with_share(experiment, recording)
+        recording, experiment = with_its_steps(recording, experiment)
+    recording, experiment = _with_share(recording, experiment)
     recording = _checked(recording, experiment)
     if experiment.record is not None:
-        experiment, recording = without_noise(experiment, recording)
-    experiment, recording = _with_zero(experiment, recording)
+        recording, experiment = without_noise(recording, experiment)
+    recording, experiment = _with_zero(recording, experiment)
     if experiment.fit_contact:
-        from biogrip.identify.contact import with_contact
+        from biogrip.identify.recorded_load import with_contact
 
         experiment = with_contact(for_trace(experiment, recording), recording)
     experiment = for_trace(experiment, recording)
@@ -105,47 +105,47 @@ def prepare(recording: Recording, experiment: Experiment) -> Trace:
     return recording, experiment
 
 
-def _with_share(experiment: Experiment, recording: Recording) -> tuple[Experiment, Recording]:
+def _with_share(recording: Recording, experiment: Experiment) -> Trace:
     """Take standard deviations that are a share of each reading for that of the smooth course.
 
     A reading that is low by chance would weigh more, and all of them be too low by twice the square
     of the share.
     """
     if recording.sd is None or not np.all(recording.readings):
-        return experiment, recording
+        return recording, experiment
     shares = recording.sd / np.abs(recording.readings)
     share = float(np.median(shares))
     if np.any(np.abs(shares - share) > levels.SAME_SHARE * share):
-        return experiment, recording
+        return recording, experiment
     said = (
         f"Standard deviations are {plain(100 * share, 2)} % of each reading. Taken is that share "
         "of the smooth course: a reading that is low by chance would weigh too much."
     )
     recording = replace(recording, sd=None, remarks_before=(*recording.remarks_before, said))
-    return replace(experiment, noise_share=share), recording
+    return recording, replace(experiment, noise_share=share)
 
 
-def _with_zero(experiment: Experiment, recording: Recording) -> tuple[Experiment, Recording]:
+def _with_zero(recording: Recording, experiment: Experiment) -> Trace:
     """Fit an offset along where rows before the load tell it, and say so.
 
     With the rows in the trace, limits allow for what they leave uncertain of the zero.
     """
-    told = experiment.offset or "offset" not in experiment.undeclared
-    if told or experiment.simulated or experiment.instrument.sweeps:
-        return experiment, recording
+    known = experiment.offset or "offset" not in experiment.undeclared
+    if known or experiment.simulated or experiment.instrument.sweeps:
+        return recording, experiment
     begins_s = 0.0
     if experiment.record is not None:
         loads = np.abs(evaluate(experiment.torque, experiment.record[:, 0]))
         begins_s = float(experiment.record[np.argmax(loads > levels.NO_LOAD * loads.max()), 0])
     if not begins_constant(recording.time_s, recording.readings, begins_s):
-        return experiment, recording
+        return recording, experiment
     before = recording.readings[recording.time_s < begins_s][:-1]
     read, unit = recording.read.instrument.read, recording.units[1]
     zero = f"{plain(read.in_unit(float(np.mean(before)), unit))} {unit}".removesuffix(" 1")
     rows = f"{len(before)} rows before the {experiment.instrument.controlled.name}"
     said = (*recording.remarks_before, f"Zero from {rows}: {zero}, taken off.")
     recording = replace(recording, remarks_before=said)
-    return replace(experiment, offset=True), recording
+    return recording, replace(experiment, offset=True)
 
 
 def for_trace(experiment: Experiment, recording: Recording) -> Experiment:
@@ -155,8 +155,8 @@ def for_trace(experiment: Experiment, recording: Recording) -> Experiment:
     known, correlation = recording.sd_known, recording.correlation
     experiment = experiment.weighted(recording.sd, known=known, correlation=correlation)
     ranges = ranges_of(experiment, recording.time_s, recording.readings)
-    found = {name: it for name, it in ranges.items() if name not in experiment.given_ranges}
-    return replace(experiment, ranges={**experiment.ranges, **found})
+    ranges = {name: genes for name, genes in ranges.items() if name not in experiment.given_ranges}
+    return replace(experiment, ranges={**experiment.ranges, **ranges})
 
 
 def _checked(trace: Recording, experiment: Experiment) -> Recording:
@@ -193,7 +193,7 @@ def _checked(trace: Recording, experiment: Experiment) -> Recording:
                 f"allowed with {experiment.model.name} are {1 / LONGEST_S:g} to {1 / SHORTEST_S:g}."
             )
         return _with_deviations(trace, experiment)
-    zeroed, _ = _with_zero(experiment, trace)
+    _, zeroed = _with_zero(trace, experiment)
     if suspicion := check_recording(trace, zeroed):
         trace = replace(trace, remarks_before=(*trace.remarks_before, suspicion))
     if experiment.noise_share is None:
@@ -382,10 +382,10 @@ def check_moduli(sweep: Recording, sd: Array | float) -> None:
     """
     least = np.broadcast_to(sd * ndtri(levels.BELOW_ZERO), sweep.readings.shape)
     for sample in np.flatnonzero(sweep.readings <= least)[:1]:
-        at, found = float(sweep.time_s[sample]), sweep.readings[sample]
+        at, modulus = float(sweep.time_s[sample]), sweep.readings[sample]
         above = f"{plain(least[sample], 2)} by the noise that is given" if least[sample] else "0"
         raise BiogripError(
-            f"{place(sweep.path, int(sweep.lines[sample]))}: found a modulus of {found:.3g}, at "
+            f"{place(sweep.path, int(sweep.lines[sample]))}: found a modulus of {modulus:.3g}, at "
             f"{SWEEP.place(at)}; allowed is one above {above}. {_NEGATIVE[at > 0]}, or it is below "
             "the noise: say how much that is (--noise), or leave these rows out (--from, --until)."
         )
@@ -488,6 +488,6 @@ def _check_turn(
 def _other_units(unit: str, units: Mapping[str, float], fits: Callable[[float], bool]) -> str:
     """Return a hint on units, or else factors, in which the numbers would be plausible."""
     named = [(size / units[unit], name) for name, size in units.items()]
-    found = [f"{factor:.4g} times (is it in {name}?)" for factor, name in named if fits(factor)]
-    found = found or [f"{factor:g} times" for factor in (1e-6, 1e-3, 1e3, 1e6) if fits(factor)]
-    return f" It would fit if it were {' or '.join(found)}." if found else ""
+    factors = [f"{factor:.4g} times (is it in {name}?)" for factor, name in named if fits(factor)]
+    factors = factors or [f"{factor:g} times" for factor in (1e-6, 1e-3, 1e3, 1e6) if fits(factor)]
+    return f" It would fit if it were {' or '.join(factors)}." if factors else ""

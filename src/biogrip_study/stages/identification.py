@@ -128,18 +128,19 @@ def fit(case: Case, seeds: Sequence[int], measurements: Path, fits: Path) -> Non
     rows: list[tuple[str | int, ...]] = []
     for group in seed_groups(seeds):
         traces = experiment.of_each(recorded.time_s, [recorded.readings[seed] for seed in group])
-        posed, rngs = {}, {}
-        for name, model in models.items():
-            posed[name] = [experiment.for_model(trace, model) for trace in traces]
-            whose = case.study.config.study_seed, case.name
-            rngs[name] = [stream(*whose, seed, f"model {name}") for seed in group]
+        whose = case.study.config.study_seed, case.name
+        posed = [
+            {name: experiment.for_model(trace, model) for name, model in models.items()}
+            for trace in traces
+        ]
+        rngs = [{name: stream(*whose, seed, f"model {name}") for name in models} for seed in group]
         done = partial(progress.done, len(group))
-        fits_by_model = fit_models(posed, case.block.least_squares, rngs, done)
-        for name, answers in fits_by_model.items():
-            sizes = len(models[name].names), len(recorded.time_s)
+        fits_of_traces = fit_models(posed, case.block.least_squares, rngs, done)
+        for name, model in models.items():
+            sizes = len(model.names), len(recorded.time_s)
             rows += [
-                (case.name, name, seed, *sizes, f"{answer.misfit:.8e}")
-                for seed, answer in zip(group, answers.values(), strict=True)
+                (case.name, name, seed, *sizes, f"{answers[name].misfit:.8e}")
+                for seed, answers in zip(group, fits_of_traces, strict=True)
             ]
     records.MODEL_FITS.write(fits, rows)
 

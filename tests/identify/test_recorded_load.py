@@ -7,7 +7,7 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.fit.trace_fit import _shown_of_errors, noise_beside
-from biogrip.identify.load_noise import smoothed
+from biogrip.identify.recorded_load import smoothed
 from biogrip.judging.whiteness import is_still
 from biogrip.library import Sample, set_up
 from biogrip.physics.instruments import INSTRUMENTS
