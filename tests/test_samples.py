@@ -79,7 +79,7 @@ def test_of_traces_that_agree_the_answer_is_said(folder: Path) -> None:
     assert said.startswith("The 2 traces agree with one linear sample (p = ")
     low, high = map(float, re.findall(r"\((\S+) to (\S+)\) for .*a none 10.csv", said)[0])
     assert low < 1 < high
-    assert "under a stress of 5, 10 Pa from" in " ".join(set_up_in_words(found))
+    assert "(1 likewise with other numbers)." in " ".join(set_up_in_words(found))
     assert {q["quantity"] for q in found["without_model"]["quantities"]} > {"J(10 s)"}
 
 

@@ -114,7 +114,7 @@ def test_the_methods_have_the_numbers_of_the_study(page: Path) -> None:
     for words in (
         "a torque of 1.6·10⁻⁹ N m for 200 s, then of 3.2·10⁻¹⁰ N m for 200 s. Its arms of 0.0015 m "
         "have a stiffness of 4.4·10⁻⁷ N m/rad, and stand at 75 degrees. The model (generalized "
-        "Maxwell-Wiechert) was fitted by least squares; the noise was taken from the scatter",
+        "Maxwell-Wiechert) was fitted by least squares, with noise by the scatter of",
         "One-sided limits hold with 97.5 % confidence. 11 of 13",
         "11 of 13 traces were used, 1 of them with a doubtful fit. Rejected: 1 (dish/8.csv). "
         "Not identified: 1 (bad.csv). Computed with biogrip 1.0.0",

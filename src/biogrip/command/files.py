@@ -27,8 +27,7 @@ from biogrip.command.outputs import (
     table_of,
     write_result,
 )
-from biogrip.command.settings import Asked, check_settings, read_trace
-from biogrip.command.sheet import by_sample, is_table, read_table
+from biogrip.command.settings import Asked, check_settings, is_table, read_trace
 from biogrip.command.words import in_columns, in_words, load_in_words
 from biogrip.config.case import SampleCase
 from biogrip.config.loading import trace_defaults
@@ -85,7 +84,7 @@ def identify_files(
     Return 1 if any of several traces could not be used. A `BiogripError` says that an option, the
     config or the only trace cannot.
     """
-    asked = [*by_sample(traces_of(files, config, settings), together=together)]
+    asked = traces_of(files, config, settings, together=together)
     alone = together or (len(files) == 1 and asked[0].place == Asked.place)
     if rows is not None:
         # The last may be beyond the end.
@@ -127,15 +126,24 @@ def identify_files(
 
 
 def traces_of(
-    files: Sequence[Path], config: Path | None, settings: Sequence[Setting]
+    files: Sequence[Path],
+    config: Path | None,
+    settings: Sequence[Setting],
+    *,
+    together: bool = False,
 ) -> list[Asked]:
-    """Return the traces of files, of which some may be tables of traces."""
-    asked: list[Asked] = []
-    for file in dict.fromkeys(files):
-        own = Asked(file, config, tuple(settings))
-        table = trace_file_problem(file) is None and is_table(own)
-        asked += read_table(file, config, settings) if table else [own]
-    return asked
+    """Return the traces of files, of which some may be tables of traces, or their samples."""
+    asked = [Asked(file, config, tuple(settings)) for file in dict.fromkeys(files)]
+    tables = {one.trace for one in asked if not trace_file_problem(one.trace) and is_table(one)}
+    if not (together or tables):
+        return asked
+    # Imported here: one trace has no use for it.
+    from biogrip.command.sheet import by_sample, read_table
+
+    rows: list[Asked] = []
+    for one in asked:
+        rows += read_table(one.trace, config, settings) if one.trace in tables else [one]
+    return [*by_sample(rows, together=together)]
 
 
 def _identify_traces(
