@@ -150,12 +150,7 @@ def write_page(outcome: Outcome, page: Path) -> None:
     further = outcome_in_words(outcomes) if several else []
     set_up = together(map(set_up_in_words, traces))
     singles = [single for data in traces for single in data.get("traces", [data])]
-    assumed: dict[str, dict[str, Any]] = {single["trace"]: single["assumed"] for single in singles}
-    shared = common([*assumed.values()])
-    beyond_shared = {
-        trace: _as_yaml({key: it for key, it in block.items() if key not in shared})
-        for trace, block in assumed.items()
-    }
+    shared = common([single["assumed"] for single in singles])
     text = (
         environment()
         .get_template("traces.html.j2")
@@ -172,7 +167,7 @@ def write_page(outcome: Outcome, page: Path) -> None:
             copied=copied,
             names=list(dict.fromkeys(name for cells in copied.values() for name in cells)),
             shared=_as_yaml(shared),
-            own=beyond_shared,
+            alike=shared == singles[0]["assumed"] if singles else True,
             many=len(traces) > _MOST_OPEN,
             marks=_STATUS_MARKS,
             counts={

@@ -241,9 +241,8 @@ def case_of(asked: Asked) -> tuple[SampleCase, Recording | None]:
 
 def _refuse_two_protocols(asked: Asked, given: Mapping[str, Any]) -> None:
     if len(protocols := [key for key in _PROTOCOLS if key in keys_in(given)]) > 1:
-        of_config = [*keys_in(read_configs(asked.configs))]
-        said = [".".join(key) + f" of {asked.config}" * (key in of_config) for key in protocols]
-        raise BiogripError(f"{asked.place}: found {' and '.join(said)}; allowed is one of them.")
+        said = " and ".join(map(".".join, protocols))
+        raise BiogripError(f"{asked.place}: found {said}; allowed is one of them.")
 
 
 def _source(setting: Setting, known: set[KeyPath], merged: Mapping[str, Any]) -> Source:
