@@ -40,7 +40,7 @@ def suspected(found: TraceResult) -> list[str]:
 def test_a_drift_that_a_sample_could_have_shown_is_suspected() -> None:
     """Most of it is fitted away, as a softer sample."""
     (said,) = suspected(gripped(0, 0.6 * DRIFT))
-    assert "identify the trace with offset=True, drift=True" in said
+    assert "identify the trace with --offset --drift" in said
     assert "k_p would be " in said
 
 
@@ -79,7 +79,7 @@ def test_an_offset_alone_is_advised_if_it_explains_as_much() -> None:
     """And the fit that is advised is what is made of the trace if it is declared."""
     (said,) = suspected(gripped(0, OFFSET))
     assert said.startswith("An offset of the instrument, fitted along, explains the trace")
-    assert "with offset=True." in said
+    assert "with --offset." in said
     advised = re.findall(r"(\S+|c \+ c_p) would be ([^;]+?)[;:.](?: |$)", said)
     found = gripped(0, OFFSET, offset=True).data["quantities"]
     words = {it["quantity"]: it["in_words"].removeprefix("determined: ") for it in found}
@@ -103,7 +103,7 @@ def test_a_power_law_is_not_taken_for_an_offset_and_a_drift(
     """Nor are its first readings outliers; the springpot fits far better."""
     found = crept(1e-2 * CREEP**exponent, models=["springpot"], **given)
     assert found.status == fit
-    assert '(model="springpot") is preferred' in found.data["advice"]
+    assert "(--model springpot) is preferred" in found.data["advice"]
     for word in ("offset", "drift", "outliers"):
         assert word not in str(found)
 

@@ -13,8 +13,8 @@ import pytest
 from biogrip.cli import main
 from biogrip.command.files import _made_from
 from biogrip.command.outputs import check_outputs, read_result
-from biogrip.command.settings import Asked, check_settings
-from biogrip.command.sheet import is_table, read_table
+from biogrip.command.settings import Asked, check_settings, is_table
+from biogrip.command.sheet import read_table
 from biogrip.config.loading import trace_defaults
 from biogrip.errors import BiogripError
 from biogrip.terminal import visible_lines

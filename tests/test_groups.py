@@ -657,7 +657,7 @@ def test_the_methods_say_what_was_compared_with_its_numbers(said: Said) -> None:
     found = said(rows, "--unit", "day", header=header, part=1)
     text = " ".join(found.split())
     assert text.startswith(
-        "The strain was recorded under 5, 7 Pa. Limits hold with "
+        "The strain was recorded under 5 Pa (1 likewise with other numbers). Limits hold with "
         "95 % confidence. 34 of 35 traces were used. Rejected: 1 (left01). "
         "Groups are those of dish: left 14 cells in 3 units; right 20 cells in 4 units."
     )

@@ -133,7 +133,7 @@ def test_what_cannot_be_used_is_said_by_the_name_of_the_argument() -> None:
         ({"hold": 0.0}, "hold: protocol.phases: no phase has a stress"),
         ({"hold": "5,0"}, "hold: found '5,0', a decimal comma. Allowed is a point"),
         ({"hold": [1.0]}, r"hold: found '\[1.0\]', allowed is a number, or one with its unit"),
-        ({"config": {"protocol": {}}}, "found hold and protocol; allowed is one of them."),
+        ({"config": {"protocol": {}}}, "found --hold and protocol; allowed is one of them."),
         ({"config": {"protocl": {}}}, "protocl"),
         ({"config": [1]}, r"config: found \[1\], allowed are values by name"),
         ({"fixed": {1: 2.0}}, "fixed: found {1: 2.0}, allowed are values by name"),

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.command.words import set_up_in_words
+from biogrip.command.words import given_in_words, set_up_in_words
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.shapes import KNOWN_SHAPES, under_shape
 from biogrip.traces.columns import shape_and_sizes
@@ -55,7 +55,7 @@ def test_an_approach_and_its_dwell_tell_the_modulus_of_young(afm: Path) -> None:
         assert limits[name]["value"] == pytest.approx(true, rel=0.015), name
         assert limits[name]["high"] < 1.02 * limits[name]["low"], name
     assert (found["fit"], found["models"]) == ("ok", [])
-    assert "by the shape: sphere 2.5 um (Hertz 1882)" in found["printed"]
+    assert any("by the shape: sphere 2.5 um (Hertz 1882)" in said for said in given_in_words(found))
     assert any("with Poisson's ratio 0.5" in said for said in set_up_in_words(found))
     assert "0 to 500 nm" in found["load"]
 

@@ -13,8 +13,8 @@ from biogrip.command import files as command
 from biogrip.command.files import identify_batch
 from biogrip.command.options import Setting
 from biogrip.command.outputs import read_result, write_result
-from biogrip.command.settings import Asked
-from biogrip.command.sheet import is_table, read_table
+from biogrip.command.settings import Asked, is_table
+from biogrip.command.sheet import read_table
 from biogrip.errors import BiogripError
 from biogrip.library import Sample, hold, set_up, simulate
 from tests.helpers.default import STUDY
@@ -87,12 +87,9 @@ def test_a_trace_may_stand_beside_a_table_that_does_not_name_it(here: Path) -> N
 
 def test_a_table_is_told_by_its_column_of_files(tmp_path: Path) -> None:
     """Also as Excel writes it: a mark of the byte order, empty lines and columns, no last cells."""
-    # Of another name than `file` the first trace is there.
-    (tmp_path / "d1").mkdir()
-    (tmp_path / "d1" / "a.csv").touch()
     for name, separator, column in (
         *(("c.tsv", "\t", "file"), ("c.csv", ",", "File"), ("c.txt", ";", "file_name")),
-        *(("c.tsv", "\t", name) for name in ("File name", "filename", "path", "Trace")),
+        *(("c.tsv", "\t", name) for name in ("File name", "filename", "File-Name")),
     ):
         path = tmp_path / name
         text = f"\ufeff{column}|dish||fixed.c_p|'cell, no'\n"

@@ -81,8 +81,8 @@ def test_a_page_begins_with_status_value_and_interval(example: Outcome, tmp_path
 def test_pictures_are_small_and_in_the_page(page: Path) -> None:
     text = page.read_text()
     pictures = re.findall('src="data:image/png;base64,([^"]+)"', text)
-    # Two a trace, a level where there is one, and one of all.
-    assert len(pictures) == 3 * 12 + 1 == len(re.findall("<img", text))
+    # Two a trace, and one of all.
+    assert len(pictures) == 2 * 12 + 1 == len(re.findall("<img", text))
     for encoded in pictures:
         content = base64.b64decode(encoded)
         assert len(content) < 60_000
@@ -91,32 +91,14 @@ def test_pictures_are_small_and_in_the_page(page: Path) -> None:
     assert not re.search("(src|href)=.(?!data:|#)", text)
 
 
-def test_the_figure_is_by_the_words_of_the_table(dish: Outcome) -> None:
-    """Groups are of the column with the fewest words, units of one that puts cells together."""
-    words = {
-        each["trace"]: {"day": f"{number % 4}", "drug": "ab"[number % 2], "size": f"{number}"}
-        for number, each in enumerate(dish.found)
-    }
-    drawn, said = draw_every_trace(replace(dish, copied=words), columns_of(dish.found))
-    assert said == "Groups: drug. Large marks: means of each day."
-    axes = drawn.axes[0]
-    assert [label.get_text() for label in axes.get_xticklabels()] == ["a", "b"]
+def test_the_figure_has_every_cell_that_tells_something(dish: Outcome) -> None:
+    axes = draw_every_trace(dish, [*columns_of(dish.found)]).axes[0]
     points = [line for line in axes.lines if line.get_markersize() == 3]
     # Not the rejected one, and not the one that is not determined.
     assert len(points) == 12 - 2
     assert sum(line.get_marker() == "^" for line in points) == 1
     assert sum(line.get_markerfacecolor() == "white" for line in points) == 1
-    # By units the chance is another one than by cells.
-    by_cell = {name: {"drug": own["drug"]} for name, own in words.items()}
-    others = (
-        draw_every_trace(replace(dish, copied=by_cell), columns_of(dish.found))[0].axes[0].texts
-    )
-    assert [it.get_text() for it in axes.texts] != [it.get_text() for it in others]
-    words[dish.found[0]["trace"]] = {"other": "of another table"}
-    assert draw_every_trace(replace(dish, copied=words), columns_of(dish.found))[0].axes
-    drawn, said = draw_every_trace(dish, columns_of(dish.found))
-    assert said == "Cells are taken for independent."
-    assert [label.get_text() for label in drawn.axes[0].get_xticklabels()] == ["all traces"]
+    assert [label.get_text() for label in axes.get_xticklabels()] == ["all traces"]
 
 
 def test_what_all_share_is_said_once() -> None:
@@ -132,7 +114,7 @@ def test_the_methods_have_the_numbers_of_the_study(page: Path) -> None:
     for words in (
         "a torque of 1.6·10⁻⁹ N m for 200 s, then of 3.2·10⁻¹⁰ N m for 200 s. Its arms of 0.0015 m "
         "have a stiffness of 4.4·10⁻⁷ N m/rad, and stand at 75 degrees. The model (generalized "
-        "Maxwell-Wiechert) was fitted by least squares; the noise was taken from the scatter",
+        "Maxwell-Wiechert) was fitted by least squares, with noise by the scatter of",
         "One-sided limits hold with 97.5 % confidence. 11 of 13",
         "11 of 13 traces were used, 1 of them with a doubtful fit. Rejected: 1 (dish/8.csv). "
         "Not identified: 1 (bad.csv). Computed with biogrip 1.0.0",

@@ -196,12 +196,13 @@ def test_a_load_that_is_on_or_off_has_its_steps(tmp_path: Path) -> None:
     holds(found, k_p=2e-5, c_p=4e-5)
 
 
-SINE_S: Array = np.arange(1000) * 0.025
+SINE_S: Array = np.linspace(0.0, 25.0, 1000)
 
 
 def oscillating(path: Path, phase: float, *, rested: bool, tau_s: float = 3.0) -> Path:
     """Strain sin(t + phase), and stress by the complex modulus; from rest a branch fades, too."""
-    turn, pole = np.exp(1j * (SINE_S + phase)), 1j * tau_s / (1 + 1j * tau_s)
+    turn = np.exp(1j * (SINE_S + phase))
+    pole = 1j * tau_s / (1 + 1j * tau_s)
     fading = K * (np.sin(phase) - (pole * np.exp(1j * phase)).imag) * np.exp(-SINE_S / tau_s)
     stress = ((K_P + K * pole) * turn).imag + rested * fading + noise(len(SINE_S), 1.0)
     table, names = np.column_stack((SINE_S, turn.imag, stress)), "time_s,strain,stress_Pa"

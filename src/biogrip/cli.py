@@ -16,7 +16,6 @@ from biogrip.errors import BiogripError, nearest
 from biogrip.terminal import visible, visible_lines
 
 _FILE_NAME_SHOWN = 200
-_USUAL = ("sls", "zener_kelvin", "kelvin_voigt", "maxwell", "burgers", "power_law")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -49,8 +48,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 class _Parser(argparse.ArgumentParser):
     """Argument parser with safe error messages, and examples at the end of its help."""
 
-    examples: tuple[str, ...] = ()
-    cost = ""
     lists_models = False
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
@@ -63,9 +60,6 @@ class _Parser(argparse.ArgumentParser):
     def format_help(self) -> str:
         """Return the help, with the sample models where one is to be named."""
         lines = _model_lines() if self.lists_models else []
-        if self.examples:
-            lines += ["", "examples:", *(f"  biogrip {example}" for example in self.examples)]
-        lines += ["", self.cost] if self.cost else []
         return super().format_help() + "".join(f"{line}\n" for line in lines)
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
@@ -83,19 +77,16 @@ class _Parser(argparse.ArgumentParser):
 
 
 def _model_lines() -> list[str]:
-    """Return the names and titles of the sample models, usual ones first."""
+    """Return the names, titles and networks of the sample models."""
     from biogrip.physics.drawing import sketched
     from biogrip.physics.models import ALIASES, MODELS
 
     width = max(map(len, MODELS))
     lines = ["", "sample models (other names; prony3, sls3: generalized_maxwell_3 without c_p):"]
-    shown = {ALIASES.get(name, name): name for name in _USUAL}
-    shown |= {name: name for name in MODELS if name not in shown}
-    for name, usual in shown.items():
-        others = [other for other in (*ALIASES, *MODELS) if ALIASES.get(other, other) == name]
-        also = ", ".join(other for other in others if other != usual)
-        lines.append(f"  {usual:<{width}}  {MODELS[name].title}" + (f" ({also})" if also else ""))
-        lines.append(f"  {'':<{width}}  {sketched(MODELS[name])}")
+    for name, model in MODELS.items():
+        also = ", ".join(other for other, meant in ALIASES.items() if meant == name)
+        lines.append(f"  {name:<{width}}  {model.title}" + (f" ({also})" if also else ""))
+        lines.append(f"  {'':<{width}}  {sketched(model)}")
     return [*lines, f"  {'jeffreys':<{width}}  Burgers fluid without its spring"]
 
 
@@ -137,52 +128,23 @@ def _setting(option: str) -> Callable[[str], Setting]:
     return set_to
 
 
-def _add_settings(parser: Any) -> None:
-    parser.set_defaults(settings=[])
-    parser.lists_models = True
-    parser.add_argument(
-        "files",
-        type=Path,
-        nargs="+",
-        metavar="TRACE",
-        help="CSV file with a header; or a table of traces: column file has their names, columns "
-        "named like keys of the config set these, others are copied to --csv",
-    )
-    text = "all traces are of one sample, which they tell together (a table: column sample)"
-    parser.add_argument("--together", action="store_true", help=text)
+def _add_command(
+    commands: Any, name: str, function: str, text: str, examples: Sequence[str] = (), cost: str = ""
+) -> Any:
+    """Add a command, what does it, and what stands at the end of its help."""
+    lines = ["examples:", *(f"  biogrip {example}" for example in examples)] if examples else []
+    shown = {"help": text, "description": text, "epilog": "\n".join([*lines, "", cost])}
+    added = commands.add_parser(name, **shown, formatter_class=argparse.RawDescriptionHelpFormatter)
+    added.set_defaults(command=function)
+    return added
 
-    def add(group: Any, name: str, action: str, text: str, **more: Any) -> None:
-        group.add_argument(name, action=action, dest="settings", help=text, **more)
 
-    for title, options in GROUPS.items():
-        group = parser.add_argument_group(title)
-        for name, metavar, _, text in options:
-            if metavar:
-                add(group, name, "append", text, metavar=metavar, type=_setting(name[2:]))
-                continue
-            add(group, name, "append_const", text, const=setting_of(name[2:], "true"))
-            no = setting_of(name[2:], "false", name.replace("--", "--no-"))
-            add(group, no.by, "append_const", argparse.SUPPRESS, const=no)
-        if title == "what was done":
-            text = "YAML file with your gripper, protocol, search range, ..."
-            group.add_argument("--config", type=Path, help=text)
-        if title == "the sample":
-            text = "do not try other models, which takes long where none fits"
-            alone = Setting("--no-compare", ("model_selection", "models"), [])
-            add(group, "--no-compare", "append_const", text, const=alone)
-            group = parser.add_argument_group("output")
-            _add_file(group, "--report", "PAGE", "HTML page with pictures")
-            _add_file(group, "--csv", "TABLE", "CSV file, a row per trace", dest="table")
-            _add_file(group, "--plot", "FIGURE", "PNG file, of one trace: its fit")
-            text = "JSON file, of one trace [TRACE.identified.json]"
-            _add_file(group, "--output", "FILE", text)
+def _add_file(parser: Any, name: str, metavar: str, text: str, **more: Any) -> None:
+    parser.add_argument(name, type=Path, metavar=metavar, help=text, **more)
 
 
 def _add_identify(commands: Any) -> None:
-    text = "identify the sample in recorded traces, without a workflow"
-    identify = commands.add_parser("identify", help=text, description=text)
-    identify.set_defaults(command="biogrip.command.files:identify_files")
-    identify.examples = (
+    examples = (
         "identify cell.csv --config my_gripper.yaml --model liquid_drop --report page.html",
         "identify creep.csv --reading 'strain=Strain [%]' --time 'Time [s]' --hold 5Pa --model sls",
         "identify afm.txt --reading 'force=Load (uN)' --time 'Time (s)' "
@@ -191,22 +153,45 @@ def _add_identify(commands: Any) -> None:
         "--frequency 'f (Hz)' --model power_law",
         "identify cells.tsv --config my_gripper.yaml --csv found.csv",
     )
-    identify.cost = "A trace takes seconds, or longer where no model fits it (--no-compare)."
-    _add_settings(identify)
-
-
-def _add_file(parser: Any, name: str, metavar: str, text: str, **more: Any) -> None:
-    parser.add_argument(name, type=Path, metavar=metavar, help=text, **more)
+    cost = "A trace takes seconds, or longer where no model fits it (--no-compare)."
+    text = "identify the sample in recorded traces, without a workflow"
+    function = "biogrip.command.files:identify_files"
+    identify = _add_command(commands, "identify", function, text, examples, cost)
+    identify.set_defaults(settings=[])
+    identify.lists_models = True
+    identify.add_argument(
+        "files",
+        type=Path,
+        nargs="+",
+        metavar="TRACE",
+        help="CSV file with a header; or a table of traces: column file has their names, columns "
+        "named like keys of the config set these, others are copied to --csv",
+    )
+    text = "all traces are of one sample, which they tell together (a table: column sample)"
+    identify.add_argument("--together", action="store_true", help=text)
+    text = "YAML file with your gripper, protocol, search range, ..."
+    identify.add_argument("--config", type=Path, help=text)
+    for title, options in GROUPS.items():
+        group = identify.add_argument_group(title)
+        for name, metavar, _, text in options:
+            how = {"action": "append", "metavar": metavar, "type": _setting(name[2:])}
+            if not metavar:
+                how = {"action": "append_const", "const": setting_of(name[2:], "true")}
+            group.add_argument(name, dest="settings", help=text, **how)
+    group = identify.add_argument_group("output")
+    _add_file(group, "--report", "PAGE", "HTML page with pictures")
+    _add_file(group, "--csv", "TABLE", "CSV file, a row per trace", dest="table")
+    _add_file(group, "--plot", "FIGURE", "PNG file, of one trace: its fit")
+    _add_file(group, "--output", "FILE", "JSON file, of one trace [TRACE.identified.json]")
 
 
 def _add_groups(commands: Any) -> None:
     text = "compare groups of cells, from the table that identify --csv wrote"
-    groups = commands.add_parser("groups", help=text, description=text)
-    groups.set_defaults(command="biogrip.groups:groups")
-    groups.examples = (
+    examples = (
         "groups found.csv --by treatment --unit dish",
         "groups found.csv --by treatment --unit dish --csv compared.csv --plot cells.pdf",
     )
+    groups = _add_command(commands, "groups", "biogrip.groups:groups", text, examples)
     groups.add_argument("found", type=Path, help="CSV file that identify --csv wrote")
     groups.add_argument("--by", required=True, metavar="COLUMN", help="column that makes groups")
     text = "column of the independent repeats: dishes, animals, days [every cell is one]"
@@ -219,10 +204,9 @@ def _add_groups(commands: Any) -> None:
 
 def _add_design(commands: Any) -> None:
     text = "search a protocol of steps that determines the samples of a config better"
-    design = commands.add_parser("design", help=text, description=text)
-    design.set_defaults(command="biogrip.design:design")
-    design.examples = ("design my.yaml", "design my.yaml --output designed.yaml")
-    design.cost = "The search takes less than a minute."
+    examples = ("design my.yaml", "design my.yaml --output designed.yaml")
+    cost = "The search takes less than a minute."
+    design = _add_command(commands, "design", "biogrip.design:design", text, examples, cost)
     design.add_argument("config", type=Path, help="YAML file with your samples")
     text = "config of the designed study, YAML [CONFIG_designed.yaml]"
     _add_file(design, "--output", "OUTPUT", text)
@@ -230,7 +214,6 @@ def _add_design(commands: Any) -> None:
 
 def _add_app(commands: Any) -> None:
     text = "open a window of this machine: drop files, choose, see the answer and its command"
-    app = commands.add_parser("app", help=text, description=text)
-    app.set_defaults(command="biogrip.app.server:open_app")
+    app = _add_command(commands, "app", "biogrip.app.server:open_app", text)
     app.add_argument("--port", type=int, metavar="PORT", help="of this machine [any that is free]")
     app.add_argument("--no-browser", action="store_true", help="print the address only")

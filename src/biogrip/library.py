@@ -47,7 +47,10 @@ one_blas_thread: Callable[[_Function], _Function] = threadpool_limits.wrap(
 
 @dataclass(frozen=True, repr=False)
 class TraceResult:
-    """What a trace tells; ``print`` says all that the command says."""
+    """What a trace tells; ``print`` says all that the command says.
+
+    Options in what is said are arguments of the same name: ``--start fit`` is ``start="fit"``.
+    """
 
     diagnosis: Diagnosis
     """The fit and all that was tested."""

@@ -28,7 +28,6 @@ CHOICES = (
 # What a sweep does not have, and what only that has.
 _OF_TIME, _OF_SWEEPS = {"time", "hold", "load", "ramp", "contact", "start", "offset"}, {"frequency"}
 _TAKES_VALUE = {name: bool(metavar) for of in GROUPS.values() for name, metavar, *_ in of}
-_TAKES_VALUE |= {"--no-offset": False, "--no-drift": False, "--no-compare": False}
 _OPTION = re.compile(r"(--[a-z-]+)(?: ((?:'[^']*'|\"[^\"]*\"|[^\s'\"])+?))?(?=[.,;:)]*(?:\s|$))")
 _PLACEHOLDER, _QUOTED = re.compile(r"(^|=)[A-Z]+$|^(and|or)$"), re.compile("'(.*?)'|\"(.*?)\"")
 _UNITS_ALLOWED = re.compile(r"allowed are ([^.;:]+?)(?:, or |, by |[.;]|$)")

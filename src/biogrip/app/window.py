@@ -17,8 +17,7 @@ from typing import IO, Any
 from biogrip.app.choices import CHOICES, likely_choices, options_typed
 from biogrip.cli import options_of
 from biogrip.command.files import traces_of
-from biogrip.command.settings import Asked, check_settings, read_trace
-from biogrip.command.sheet import is_table
+from biogrip.command.settings import Asked, check_settings, is_table, read_trace
 from biogrip.command.words import limits_in_short
 from biogrip.errors import BiogripError
 from biogrip.physics.instruments import INSTRUMENTS
@@ -148,7 +147,7 @@ class Window:
         files = [self.folder / name for name in self.inputs]
         config = self.folder / self.config[1] if self.config else None
         traces = traces_of(files, config, given["settings"])
-        for own in traces:
+        for own in (trace for sample in traces for trace in sample.traces):
             if own.trace.resolve().parent != self.folder.resolve():
                 raise BiogripError(f"{own.place}: found {own.trace}, allowed are dropped files.")
         return traces

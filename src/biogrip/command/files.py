@@ -27,8 +27,7 @@ from biogrip.command.outputs import (
     table_of,
     write_result,
 )
-from biogrip.command.settings import Asked, check_settings, read_trace
-from biogrip.command.sheet import by_sample, is_table, read_table
+from biogrip.command.settings import Asked, check_settings, is_table, read_trace
 from biogrip.command.words import in_columns, in_words, load_in_words
 from biogrip.config.case import SampleCase
 from biogrip.config.loading import trace_defaults
@@ -86,7 +85,7 @@ def identify_files(
     Return 1 if any of several traces could not be used. A `BiogripError` says that an option, the
     config or the only trace cannot.
     """
-    asked = [*by_sample(traces_of(files, config, settings), together=together)]
+    asked = traces_of(files, config, settings, together=together)
     alone = together or (len(files) == 1 and asked[0].place == Asked.place)
     if rows is not None:
         # The last may be beyond the end.
@@ -128,15 +127,24 @@ def identify_files(
 
 
 def traces_of(
-    files: Sequence[Path], config: Path | None, settings: Sequence[Setting]
+    files: Sequence[Path],
+    config: Path | None,
+    settings: Sequence[Setting],
+    *,
+    together: bool = False,
 ) -> list[Asked]:
-    """Return the traces of files, of which some may be tables of traces."""
-    asked: list[Asked] = []
-    for file in dict.fromkeys(files):
-        own = Asked(file, config, tuple(settings))
-        table = trace_file_problem(file) is None and is_table(own)
-        asked += read_table(file, config, settings) if table else [own]
-    return asked
+    """Return the traces of files, of which some may be tables of traces, or their samples."""
+    asked = [Asked(file, config, tuple(settings)) for file in dict.fromkeys(files)]
+    tables = {one.trace for one in asked if not trace_file_problem(one.trace) and is_table(one)}
+    if not (together or tables):
+        return asked
+    # Imported here: one trace has no use for it.
+    from biogrip.command.sheet import by_sample, read_table
+
+    rows: list[Asked] = []
+    for one in asked:
+        rows += read_table(one.trace, config, settings) if one.trace in tables else [one]
+    return [*by_sample(rows, together=together)]
 
 
 def _identify_traces(
@@ -241,34 +249,32 @@ def identify_batch(
                     told.note(form_in_words(trace.trace, recording.form))
                 read[number] = case, prepare(recording, case.judged_experiment)
         read = {of: it for of, it in read.items() if asked[every[of][0]].name not in refused}
-        results: dict[int, dict[str, Any]] = {}
-        parts = defaultdict[int, dict[int, tuple[Diagnosis, dict[str, Any]]]](dict)
-        for number, diagnosis in _diagnosed([asked[of] for of, _ in every], read, refused, told):
-            index, own = every[number]
-            trace = asked[index]
-            with _caught(trace, refused):
-                data = data_of(diagnosis, read[number][0], own.name, own.given)
-                parts[index][number] = diagnosis, data
-                if len(parts[index]) < len(trace.traces):
-                    continue
-                if trace.together:
-                    names = [own.name for own in trace.together]
-                    given = [said for _, said in sorted(parts[index].items())]
-                    diagnosis, data = sample_of(trace.name, dict(zip(names, given, strict=True)))
-                results[index] = data
-                del parts[index]
-            if index in results and outputs is not None:
-                write_result(outputs[index], results[index], made_from[index])
-            if index in results and drawn:
+        of_each = [asked[of] for of, _ in every]
+        diagnosed = dict(_diagnosed(of_each, read, refused, told))
+        for index, sample in enumerate(asked):
+            parts = {}
+            with _caught(sample, refused):
+                for number in (number for number, (of, _) in enumerate(every) if of == index):
+                    if number in diagnosed:
+                        trace, diagnosis = every[number][1], diagnosed[number]
+                        data = data_of(diagnosis, read[number][0], trace.name, trace.given)
+                        parts[trace.name] = diagnosis, data
+                if sample.together and sample.name not in refused:
+                    diagnosis, data = sample_of(sample.name, parts)
+            if sample.name in refused:
+                continue
+            outcome.found.append(data)
+            if outputs is not None:
+                write_result(outputs[index], data, made_from[index])
+            if drawn:
                 # Imported here: loading Matplotlib takes long.
                 from biogrip.command.page import trace_pictures
 
                 # What is found counts without a picture, too.
-                with _caught(trace, {}):
-                    outcome.pictures[trace.name] = trace_pictures(diagnosis, results[index])
-    outcome.found.extend(results[index] for index in sorted(results))
-    names = [trace.name for trace in asked]
-    outcome.refused.update((name, refused[name]) for name in names if name in refused)
+                with _caught(sample, {}):
+                    outcome.pictures[sample.name] = trace_pictures(diagnosis, data)
+    in_order = (sample.name for sample in asked if sample.name in refused)
+    outcome.refused.update((name, refused[name]) for name in in_order)
     return outcome
 
 

@@ -37,8 +37,8 @@ def _text(key: str) -> Reader:
     return lambda text: (tuple(key.split(".")), text)
 
 
-def _switch(key: str) -> Reader:
-    return lambda text: (tuple(key.split(".")), {"true": True, "false": False}[text.lower()])
+def _switch(key: str, on: Any = True, off: Any = False) -> Reader:
+    return lambda text: (tuple(key.split(".")), {"true": on, "false": off}[text.lower()])
 
 
 def _reading(text: str) -> tuple[Path, Any]:
@@ -190,6 +190,10 @@ GROUPS: dict[str, list[tuple[str, str, Reader, str]]] = {
             *("--at", "SECONDS,...", _at),
             "times after a step at which to print G, K or J, of any model",
         ),
+        (
+            *("--no-compare", "", _switch("model_selection.models", [])),
+            "do not try other models, which takes long where none fits",
+        ),
     ],
     "the noise and the instrument": [
         ("--noise", "SD", _text("measurement.noise_rad"), "known noise, in the readings' SI unit"),
@@ -206,13 +210,10 @@ GROUPS: dict[str, list[tuple[str, str, Reader, str]]] = {
             *("--noise-model", "NAME", _text("measurement.noise_model")),
             "white, or coloured: autocorrelated",
         ),
-        (
-            "--offset",
-            "",
-            _switch("measurement.offset"),
-            "fit an offset, too; or --no-offset",
-        ),
-        ("--drift", "", _switch("measurement.drift"), "fit a linear drift, too; or --no-drift"),
+        ("--offset", "", _switch("measurement.offset"), "fit an offset of the readings, too"),
+        ("--no-offset", "", _switch("measurement.offset", False, True), "or not"),
+        ("--drift", "", _switch("measurement.drift"), "fit a linear drift, too"),
+        ("--no-drift", "", _switch("measurement.drift", False, True), "or not"),
     ],
     "any other key of the config": [
         (

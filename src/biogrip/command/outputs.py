@@ -5,7 +5,6 @@ import os
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,7 @@ from biogrip import __version__
 from biogrip.command.words import set_up_in_words
 from biogrip.digits import rounded_numbers, with_unit
 from biogrip.errors import BiogripError
-from biogrip.files import AGAIN, read_object, scratch_path, whole, write_object, write_text
+from biogrip.files import AGAIN, read_object, read_table, write_object, write_rows
 from biogrip.judging.without_model import EXPONENT, LEVEL
 from biogrip.physics.instruments import INSTRUMENTS, ROTATION, Channel
 from biogrip.terminal import visible, visible_lines
@@ -85,13 +84,7 @@ def _check_output(output: Path, written_for: str) -> None:
     if os.path.isdir(output) or not os.path.isdir(folder) or not os.access(folder, os.W_OK):
         text = "cannot be written; allowed is a file in a folder that you may write to."
         raise BiogripError(f"{visible(output)}: {text}")
-    try:
-        # A name that is too long for the system is found here.
-        for place in (output, scratch_path(output)):
-            place.exists()
-    except OSError as error:
-        raise BiogripError(f"{visible(output)}: cannot be written: {error.strerror}.") from error
-    if output.exists() and not output.is_symlink() and not output.is_file():
+    if os.path.exists(output) and not (os.path.islink(output) or os.path.isfile(output)):
         raise BiogripError(f"{visible(output)}: is no regular file; allowed is one.")
     if not os.path.lexists(output):
         return
@@ -148,15 +141,16 @@ def read_result(path: Path, made_from: str) -> dict[str, Any]:
 def _renamed(data: dict[str, Any], *, written: bool) -> dict[str, Any]:
     """Return a result whose keys name the unit of what is read, if written, or radians."""
     read = INSTRUMENTS[data["reads"]["quantity"]].read
-    pairs = ((name, _in_units(name, read)) for name in _OF_READINGS)
-    names = dict(pair if written else pair[::-1] for pair in pairs)
-
-    def renamed(own: dict[str, Any]) -> dict[str, Any]:
-        return {names.get(key, key): each for key, each in own.items()}
-
+    names = {name: _in_units(name, read) for name in _OF_READINGS}
+    if not written:
+        names = {unit: name for name, unit in names.items()}
     kept = {"assumed": data["assumed"]}
     if "traces" in data:
         kept["traces"] = [_renamed(trace, written=written) for trace in data["traces"]]
+
+    def renamed(block: dict[str, Any]) -> dict[str, Any]:
+        return {names.get(key, key): value for key, value in block.items()}
+
     return {**json.loads(json.dumps(data), object_hook=renamed), **kept}
 
 
@@ -215,8 +209,7 @@ def join_tables(parts: list[Path], table: Path, rows: int) -> None:
 
     frames, last = [], list(_LAST)
     for part in parts:
-        rows_of = StringIO(whole(part), newline="")
-        frames.append(frame := pd.read_csv(rows_of, dtype=str, keep_default_na=False))
+        frames.append(frame := pd.DataFrame(read_table(part)))
         first, end = map(int, part.stem.split("-"))
         wanted = min(end + 1, rows) - first
         if len(frame) != wanted or not {"samples", *last} <= {*frame}:
@@ -227,5 +220,6 @@ def join_tables(parts: list[Path], table: Path, rows: int) -> None:
     told = [frame.columns[at : at + 2] for frame in frames if (frame.iloc[:, at + 1] != "").any()]
     for frame in frames if told else []:
         frame.columns = [*frame.columns[:at], *told[0], *frame.columns[at + 2 :]]
-    every = pd.concat(frames)
-    write_text(table, every[[*every.columns.drop(last), *last]].to_csv(index=False))
+    every = pd.concat(frames).fillna("")
+    every = every[[*every.columns.drop(last), *last]]
+    write_rows(table, [*every], every.to_numpy().tolist())

@@ -31,67 +31,29 @@ from biogrip.figures.fit import draw_fit, fit_of
 from biogrip.figures.likelihood import draw_profiles_of
 from biogrip.files import write_text
 from biogrip.identify.together import Together
-from biogrip.judging.cells import CELL, Told, compare, gather, shared_columns
+from biogrip.judging.cells import Told, compare, gather
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.judging.doubts import DOUBTFUL, OK, REJECTED
-from biogrip.judging.without_model import LEVEL, level_turned
 from biogrip.page.templates import data_url, environment
 from biogrip.physics.drawing import sketched
 from biogrip.physics.models import Sample
-from biogrip.physics.protocol import evaluate, hold, join_phases, largest_load
-from biogrip.physics.response import simulated_response
+from biogrip.physics.protocol import largest_load
 from biogrip.terminal import visible_lines
 
 _STATUS_MARKS = {OK: "✓", DOUBTFUL: "!", REJECTED: "✕"}
-# Most groups of a column that a figure shows, and the word of all traces where there is no such.
-_GROUPS_SHOWN, _ALL, _MOST_PANELS = 6, "all traces", 6
+# The group of all traces, and most panels beside each other.
+_ALL, _MOST_PANELS = "all traces", 6
 # Most traces whose pictures are open, and printed.
 _MOST_OPEN = 3
-# Times at which a level is drawn; size of the picture of a fit, which is read on a telephone, too.
-_BAND, _FIT_IN = 25, (4.4, 3.4)
+# Size of the picture of a fit, which is read on a telephone, too.
+_FIT_IN = (4.4, 3.4)
 
 
 def trace_pictures(diagnosis: Diagnosis, data: Mapping[str, Any]) -> list[str]:
-    """Return pictures of a trace as data URLs: the fit with its residuals; profiles, and stacked.
-
-    A fourth one is of the level over time, as far as that is told without a model.
-    """
-    drawn, told = draw_best(diagnosis), data["without_model"]["quantities"]
+    """Return pictures of a trace as data URLs: the fit with residuals; profiles, and stacked."""
     with style.styled():
-        more = [draw_level(diagnosis, data)] if told and diagnosis.recording else []
         profiles = [draw_profiles_of(data, stacked=stacked) for stacked in (False, True)]
-        return [address(picture) for picture in (drawn, *profiles, *more)]
-
-
-def draw_level(diagnosis: Diagnosis, data: Mapping[str, Any]) -> Figure:
-    """Draw what limits any linear sample has at times after a step, and the best fit.
-
-    Where one level was held, readings over it are drawn, too.
-    """
-    recording, experiment = diagnosis.identified
-    first_s, last_s = data["without_model"]["covered_s"]
-    times = np.geomspace(first_s, last_s, _BAND)
-    told = diagnosis.without_model(times.tolist(), [LEVEL]).told
-    step = join_phases((hold(2 * times[-1], 1.0),), deforms=experiment.instrument.deforms)
-    network = experiment.searched.network(np.exp(diagnosis.likelihood.best))
-    best = simulated_response(experiment.gripper, network, step, times)[0]
-    turned = level_turned(diagnosis.likelihood.problem.residuals) or (lambda response: response)
-    drawn = style.figure(style.COLUMN_IN, 2.4)
-    axes = drawn.subplots()
-    low, high = np.array([(level.low, level.high) for level in told], dtype=float).T
-    axes.fill_between(times, low, high, color=style.SHADE, label="any linear sample")
-    axes.plot(times, turned(best), "--", color=style.FITTED, label="best fit")
-    after = recording.time_s > 0
-    held = evaluate(experiment.torque, recording.time_s[after])
-    if not (experiment.instrument.sweeps or np.ptp(held) or experiment.offset_and_drift):
-        readings = turned(recording.readings[after] / held)
-        axes.plot(recording.time_s[after], readings, ".", color=style.MEASURED, markersize=1.2)
-    ends = float(np.nanmin(low)), float(np.nanmax(high))
-    axes.set_ylim(ends[0] - 0.1 * np.ptp(ends), ends[1] + 0.1 * np.ptp(ends))
-    axes.set(xscale="log", xlabel="time after a step (s)", xlim=times[[0, -1]])
-    axes.set_ylabel(with_unit(told[0].quantity.split("(")[0], told[0].unit))
-    axes.legend()
-    return drawn
+    return [address(picture) for picture in (draw_best(diagnosis), *profiles)]
 
 
 def draw_joint(sample: Together) -> Figure:
@@ -158,39 +120,20 @@ def address(drawn: Figure) -> str:
         return data_url("image/png", style.png_of(drawn, 64))
 
 
-def draw_every_trace(outcome: Outcome, columns: Mapping[str, str]) -> tuple[Figure, str]:
-    """Draw quantities of all traces, and return the figure with what its groups are.
-
-    Groups are those of the column with the fewest words, units those of one that puts cells of a
-    group together.
-    """
-    names = dict.fromkeys(name for cells in outcome.copied.values() for name in cells)
-    none = dict.fromkeys(names, "")
-    copied = outcome.copied
-    every = [_told_by(data, {**none, **copied.get(data["trace"], {})}) for data in outcome.found]
-    words_of = {name: {told.words[name] for told in every} for name in every[0].words}
-    few = [name for name, of in words_of.items() if 1 < len(of) <= _GROUPS_SHOWN and "" not in of]
-    by = min(set(few) - {CELL}, key=lambda name: (len(words_of[name]), name), default=_ALL)
-    shared = sorted(shared_columns(every, by), key=lambda column: not column[1])
-    unit = shared[0][0] if shared and by != _ALL else None
-    confidence = outcome.found[0]["confidence"]
-    cells = gather(every, by, unit, confidence)
-    groups = sorted({cell.group for cell in cells})
-    compared = compare(cells, groups, confidence, units=unit is not None)
-    units = {q["quantity"]: q["unit"] for data in outcome.found for q in data["quantities"]}
-    said = f"Groups: {by}. " if by != _ALL else ""
-    said += f"Large marks: means of each {unit}." if unit else "Cells are taken for independent."
-    # A panel each side by side, as many as a screen has room for.
-    width_in = max(style.PAGE_IN, ONE_COLUMN_IN / 2 * min(len(columns), _MOST_PANELS))
-    units = {name: units[name] for name in columns}
-    return draw_cells(cells, compared, units, width_in, unit), said
-
-
-def _told_by(data: Mapping[str, Any], copied: Mapping[str, str]) -> Told:
-    """Return what a trace tells, with the cells of its row in a table of traces."""
+def draw_every_trace(outcome: Outcome, columns: Sequence[str]) -> Figure:
+    """Draw quantities of all traces, a panel each, with their geometric means."""
     numbers = ("verdict", "value", "low", "high")
-    told = {q["quantity"]: tuple(map(q.get, numbers)) for q in data["quantities"]}
-    return Told(data["trace"], data["fit"], {**copied, _ALL: "all traces"}, told)
+    told = []
+    for data in outcome.found:
+        quantities = {q["quantity"]: tuple(map(q.get, numbers)) for q in data["quantities"]}
+        told.append(Told(data["trace"], data["fit"], {_ALL: _ALL}, quantities))
+    confidence = outcome.found[0]["confidence"]
+    cells = gather(told, _ALL, None, confidence)
+    compared = compare(cells, [_ALL], confidence, units=False)
+    units = {q["quantity"]: q["unit"] for data in outcome.found for q in data["quantities"]}
+    # Side by side, as many as a screen has room for.
+    width_in = max(style.PAGE_IN, ONE_COLUMN_IN / 2 * min(len(columns), _MOST_PANELS))
+    return draw_cells(cells, compared, {name: units[name] for name in columns}, width_in, None)
 
 
 def write_page(outcome: Outcome, page: Path) -> None:
@@ -198,22 +141,16 @@ def write_page(outcome: Outcome, page: Path) -> None:
     traces, copied = outcome.found, outcome.copied
     columns = words.columns_of(traces)
     several = len(traces) != 1 or bool(outcome.refused)
-    figure_of_all = groups = ""
+    figure_of_all = ""
     if several and traces:
         with style.styled():
-            drawn, groups = draw_every_trace(outcome, columns)
-            figure_of_all = address(drawn)
+            figure_of_all = address(draw_every_trace(outcome, [*columns]))
     outcomes = [(data["trace"], data["fit"]) for data in traces]
     outcomes += [(trace, FAILED) for trace in outcome.refused]
     further = outcome_in_words(outcomes) if several else []
     set_up = together(map(set_up_in_words, traces))
     singles = [single for data in traces for single in data.get("traces", [data])]
-    assumed: dict[str, dict[str, Any]] = {single["trace"]: single["assumed"] for single in singles}
-    shared = common([*assumed.values()])
-    beyond_shared = {
-        trace: _as_yaml({key: it for key, it in block.items() if key not in shared})
-        for trace, block in assumed.items()
-    }
+    shared = common([single["assumed"] for single in singles])
     text = (
         environment()
         .get_template("traces.html.j2")
@@ -222,7 +159,6 @@ def write_page(outcome: Outcome, page: Path) -> None:
             refused={trace: visible_lines(reason) for trace, reason in outcome.refused.items()},
             pictures=outcome.pictures,
             figure_of_all=figure_of_all,
-            groups=groups,
             set_up=set_up,
             notes=alike((data["trace"], note) for data in traces for note in notes_of(data)),
             methods=paragraph([*set_up, *further]),
@@ -231,7 +167,7 @@ def write_page(outcome: Outcome, page: Path) -> None:
             copied=copied,
             names=list(dict.fromkeys(name for cells in copied.values() for name in cells)),
             shared=_as_yaml(shared),
-            own=beyond_shared,
+            alike=shared == singles[0]["assumed"] if singles else True,
             many=len(traces) > _MOST_OPEN,
             marks=_STATUS_MARKS,
             counts={

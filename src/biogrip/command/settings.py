@@ -65,6 +65,9 @@ _PRONY = re.compile(r"(?:prony|sls)_?([1-8])")
 # Of each group of keys of the measurement, the one that is set last replaces the others.
 _ONE_OF = {"start_s", "fit_start"}, {*READINGS}
 _MOST_SHOWN = 10
+SEPARATORS = ",;\t"
+"""What separates the cells of a table of traces."""
+_FILES, _HEAD_BYTES = ("file", "filename", "file_name"), 100_000
 
 
 @dataclass(frozen=True)
@@ -181,6 +184,27 @@ def _laid_over(blocks: dict[str, Any], setting: Setting) -> dict[str, Any]:
     return overlaid(blocks, value)
 
 
+def is_table(asked: Asked) -> bool:
+    """Return True if the first line of a file is a header with a column `file`, and no trace's."""
+    with asked.trace.open("rb") as stream:
+        line = stream.readline(_HEAD_BYTES).decode("utf-8-sig", "replace")
+    names = [cell.strip(' "\r\n') for cell in re.split(f"[{SEPARATORS}]", line)]
+    measured = measured_keys(asked.given)
+    readings = {measured[key] for key in READINGS if key in measured} or {"rotation_rad"}
+    of_trace = measured.get("time", "time_s") in names and readings & {*names}
+    return file_column(names) is not None and not of_trace
+
+
+def file_column(names: Sequence[str]) -> str | None:
+    """Return the first column that is named for files of traces, if there is one."""
+    return next((name for name in names if column_as_option(name) in _FILES), None)
+
+
+def column_as_option(name: str) -> str:
+    """Return a name of a column as an option would be written, but for its hyphens."""
+    return re.sub(r"[ -]+", "_", name.lower())
+
+
 def read_trace(asked: Asked) -> tuple[Recording, SampleCase]:
     """Read a trace, and return it with the case that it is.
 
@@ -217,9 +241,8 @@ def case_of(asked: Asked) -> tuple[SampleCase, Recording | None]:
 
 def _refuse_two_protocols(asked: Asked, given: Mapping[str, Any]) -> None:
     if len(protocols := [key for key in _PROTOCOLS if key in keys_in(given)]) > 1:
-        of_config = [*keys_in(read_configs(asked.configs))]
-        said = [".".join(key) + f" of {asked.config}" * (key in of_config) for key in protocols]
-        raise BiogripError(f"{asked.place}: found {' and '.join(said)}; allowed is one of them.")
+        said = " and ".join(map(".".join, protocols))
+        raise BiogripError(f"{asked.place}: found {said}; allowed is one of them.")
 
 
 def _source(setting: Setting, known: set[KeyPath], merged: Mapping[str, Any]) -> Source:
@@ -259,11 +282,9 @@ def _with_instrument(
     blocks |= {"instrument": kind, "measurement": measurement}
     block = checked(MeasurementBlock, measurement)[0]
     controlled = (instrument if block is None else block.instrument).controlled
-    if instrument.sweeps:
-        if held is not None:
-            raise BiogripError(f"{by}: is of a trace in time, not of a sweep; leave it out.")
-        return _with_hold(blocks, controlled), None, None
-    if held is None and measurement.get(LOAD[-1]) is None:
+    if instrument.sweeps and held is not None:
+        raise BiogripError(f"{by}: is of a trace in time, not of a sweep; leave it out.")
+    if not instrument.sweeps and held is None and measurement.get(LOAD[-1]) is None:
         if "protocol" in given or instrument.has_jaws:
             return blocks, None, None
         if not instrument.relative:
@@ -272,8 +293,8 @@ def _with_instrument(
                 f"{by}: is missing; allowed is the {controlled.name}{unit} that was held, a "
                 "column of it by --load, or a protocol in --config."
             )
-    if block is None:
-        # The check of the config will say why.
+    if instrument.sweeps or block is None:
+        # If there is no block, the check of the config will say why.
         return _with_hold(blocks, controlled), None, None
     level = 1.0 if held is None else controlled.in_si(*held_unit(held, controlled, by))
     try:
@@ -292,7 +313,9 @@ def _with_instrument(
     if block.tip_power is not None:
         touching = np.maximum(touching, (-np.inf, 0.0))
     if start_s is None:
-        start_s = _start_of(touching)
+        # With its first row, or before it, if the load is there.
+        first_s, first = touching[0].tolist()
+        start_s = min(first_s, 0.0) if first else first_s
         blocks["measurement"] = measurement | {"start_s": start_s or None}
     record = _from(recording.load, start_s)
     largest = float(max(touching[:, 1], key=abs))
@@ -348,12 +371,6 @@ def _duration(recording: Recording, start_s: float | None) -> float:
             "Is the unit of time right? Or say when it started (--start)."
         )
     return lasts_s if lasts_s > 0 else 1.0
-
-
-def _start_of(load: Array) -> float:
-    """Return when a recorded load starts: with its first row, or before it, if it is there."""
-    first_s, first = load[0].tolist()
-    return min(first_s, 0.0) if first else first_s
 
 
 def _from(load: Array, start_s: float) -> Array:

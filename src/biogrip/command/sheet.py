@@ -18,7 +18,13 @@ from typing import Any
 
 from biogrip.command.options import OPTIONS, Setting, setting_of
 from biogrip.command.outputs import COLUMNS
-from biogrip.command.settings import Asked, measured_keys, refuse_all
+from biogrip.command.settings import (
+    SEPARATORS,
+    Asked,
+    column_as_option,
+    file_column,
+    refuse_all,
+)
 from biogrip.config.source import value_of
 from biogrip.digits import counted
 from biogrip.errors import BiogripError, nearest
@@ -26,64 +32,30 @@ from biogrip.physics.instruments import CONTROLLED
 from biogrip.physics.models import ALIASES, CANDIDATES
 from biogrip.terminal import visible
 from biogrip.traces.columns import listed, number_and_unit, place, trace_file_problem
-from biogrip.traces.measurement_block import READINGS
 
-_FILES = ("file", "filename", "filepath", "path", "trace", "tracefile")
 _OF_NUMBERS: tuple[str, ...] = ("hold", "ramp", "noise", "noise_share", "start", "from", "until")
 _OF_WORDS: tuple[str, ...] = ("noise_model", "offset", "drift", "reading", "shape")
 # Other names of what is held.
 _HELD = {"held", "load", "pressure", "indentation", *(channel.name for channel in CONTROLLED)}
-# Column of samples of several traces, and name of one whose traces are all that there are.
-_SAMPLE, _TOGETHER = "sample", "together"
-_SEPARATORS = ",;\t"
+# Columns of traces, and of samples of several; name of a sample of all traces.
+_FILE, _SAMPLE, _TOGETHER = "file", "sample", "together"
 _OF_RESULTS = re.compile(r".* (verdict|value|low|high)( \(.*\))?")
-_HEAD_BYTES = 100_000
 # Of a table of traces at most; rows are as wide as its header.
 _LONGEST, _MOST_COLUMNS, _MOST_CELLS = 20_000_000, 1000, 3_000_000
-
-
-def is_table(asked: Asked) -> bool:
-    """Return True if the first line of a file is a header with a column `file`, and no trace's.
-
-    Another name of that column, as `path`, counts above the name of a file that exists.
-    """
-    with asked.trace.open("rb") as stream:
-        lines = [stream.readline(_HEAD_BYTES).decode("utf-8-sig", "replace") for _ in range(2)]
-    names, cells = (
-        [cell.strip(' "\r\n') for cell in re.split(f"[{_SEPARATORS}]", line)] for line in lines
-    )
-    if (name := _file_column(names)) is None:
-        return False
-    measured = measured_keys(asked.given)
-    readings = {measured[key] for key in READINGS if key in measured} or {"rotation_rad"}
-    if measured.get("time", "time_s") in names and readings & {*names}:
-        return False
-    below = dict(zip(names, cells, strict=False)).get(name)
-    exists = below and trace_file_problem(asked.trace.parent / below) is None
-    return bool(exists) or name.lower() == _FILES[0]
-
-
-def _plain(name: str) -> str:
-    return re.sub(r"[ -]+", "_", name.lower())
-
-
-def _file_column(names: Sequence[str]) -> str | None:
-    found = {_plain(name).replace("_", ""): name for name in reversed(names)}
-    return next((found[name] for name in _FILES if name in found), None)
 
 
 def _meant(name: str, cells: Sequence[str]) -> str | None:
     """Return the option that a column is, but for its unit or spelling; None for others."""
     if all(cell.lower() in {*ALIASES, *CANDIDATES} for cell in cells):
         return "model"
-    bare, options = re.sub(r"_?[(\[].*$|_[^_]+$", "", _plain(name)), _OF_NUMBERS
+    bare, options = re.sub(r"_?[(\[].*$|_[^_]+$", "", column_as_option(name)), _OF_NUMBERS
     try:
         for cell in cells:
             number_and_unit(cell)
-        if {bare, _plain(name)} & _HELD:
+        if {bare, column_as_option(name)} & _HELD:
             return "hold"
     except ValueError:
-        bare, options = _plain(name), _OF_WORDS
+        bare, options = column_as_option(name), _OF_WORDS
     return next(iter(get_close_matches(bare, options, n=1, cutoff=0.75)), None)
 
 
@@ -97,12 +69,12 @@ def read_table(
     are no YAML, a trace twice.
     """
     (_, header), *rows = _rows(path)
-    if (file := _file_column(header)) is None:
+    if (file := file_column(header)) is None:
         raise BiogripError(
-            f"{place(path, 1)}: found no column '{_FILES[0]}' among {listed(header)}; allowed is "
-            f"one.{nearest(_FILES[0], header)}"
+            f"{place(path, 1)}: found no column '{_FILE}' among {listed(header)}; allowed is "
+            f"one.{nearest(_FILE, header)}"
         )
-    as_options = {name: _plain(name).replace("_", "-") for name in header}
+    as_options = {name: column_as_option(name).replace("_", "-") for name in header}
     options_of = {name: option for name, option in as_options.items() if option in OPTIONS}
     problems = list(_column_problems(path, header, rows, {file, *options_of}))
     used = {*options_of, *(name for name in header if "." in name)}
@@ -153,7 +125,7 @@ def by_sample(asked: Sequence[Asked], *, together: bool = False) -> Iterator[Ask
     """
     samples = defaultdict[str | int, list[Asked]](list)
     for number, own in enumerate(asked):
-        cells = {_plain(name): cell for name, cell in own.copied.items()}
+        cells = {column_as_option(name): cell for name, cell in own.copied.items()}
         samples[_TOGETHER if together else cells.get(_SAMPLE) or number].append(own)
     for name, traces in samples.items():
         first, cells = traces[0], {}
@@ -188,7 +160,7 @@ def _rows(path: Path) -> list[tuple[int, list[str]]]:
         if len(text) > _LONGEST:
             raise ValueError(f"found more than {_LONGEST} characters, allowed are fewer")
         header = text.partition("\n")[0]
-        separator = "\t" if path.suffix == ".tsv" else max(_SEPARATORS, key=header.count)
+        separator = "\t" if path.suffix == ".tsv" else max(SEPARATORS, key=header.count)
         reader = csv.reader(StringIO(text), delimiter=separator, skipinitialspace=True, strict=True)
         if rows := [(reader.line_num, [*map(str.strip, row)]) for row in reader]:
             if (columns := len(rows[0][1])) > _MOST_COLUMNS or columns * len(rows) > _MOST_CELLS:
@@ -213,7 +185,7 @@ def _column_problems(
             yield f"{where}: is a column of the results; allowed is another name."
         elif name and cells and "." not in name and name not in used:
             meant = _meant(name, cells)
-            if meant and meant not in map(_plain, header):
+            if meant and meant not in map(column_as_option, header):
                 yield (
                     f"{where}: looks like a setting and is none; allowed is '{meant}' for a column "
                     "that sets it, in SI units, or a name unlike a setting's."

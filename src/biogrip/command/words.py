@@ -432,7 +432,8 @@ def set_up_in_words(found: Mapping[str, Any]) -> list[str]:
     along = [name for key, name in terms.items() if key in found]
     also = f", along with the instrument's {' and '.join(along)}" if along else ""
     title = found["model_title"].removesuffix(" model")
-    said.append(f"The model ({title}{fixed}) was fitted by least squares{also}; {_noise(found)}.")
+    text = f"The model ({title}{fixed}) was fitted by least squares{also}"
+    said.append(f"{text}, with {noise_in_words(found)}.")
     level = f"{100 * found['confidence']:g} %"
     said.append(f"Intervals are {level} profile-likelihood limits. {found['limits']}")
     said += one_sided_in_words([found])
@@ -460,15 +461,6 @@ def _protocol(found: Mapping[str, Any]) -> str:
     return ", then ".join(parts)
 
 
-def _noise(found: Mapping[str, Any]) -> str:
-    given = found["assumed"]["measurement"]
-    if known := [key for key in KNOWN_NOISE if given.get(key) is not None]:
-        return f"the noise was given ({known[0]})"
-    if found["noise_model"]:
-        return "the noise was modelled as autocorrelated"
-    return "the noise was taken from the scatter of neighbouring readings"
-
-
 def outcome_in_words(traces: Iterable[tuple[str, str]]) -> list[str]:
     """Return sentences on what was used and what was refused, from name and fit of traces."""
     every = [*traces]
@@ -484,24 +476,12 @@ def outcome_in_words(traces: Iterable[tuple[str, str]]) -> list[str]:
 
 
 def together(several: Iterable[Sequence[str]]) -> list[str]:
-    """Return what several traces say once: of sentences that begin alike, the first.
-
-    Few say all of their numbers: "a stress of 2, 5, 10 Pa".
-    """
-    by_start: dict[tuple[str, ...], dict[str, None]] = {}
-    for sentences in several:
-        for each in sentences:
-            by_start.setdefault(tuple(each.split()[:4]), {})[each] = None
+    """Return what several traces say once: of sentences alike but for numbers, the first."""
+    every = dict.fromkeys(sentence for sentences in several for sentence in sentences)
     said = []
-    for first, *others in by_start.values():
-        words = [sentence.split() for sentence in (first, *others)]
-        if len(words) > _MOST_NAMED:
-            said.append(f"{first.removesuffix('.')} ({len(others)} likewise with other numbers).")
-        elif len({*map(len, words)}) > 1:
-            said += [first, *others]
-        else:
-            alike = zip(*words, strict=True)
-            said.append(" ".join(", ".join(dict.fromkeys(word)) for word in alike))
+    for first, ones in alike(("", sentence) for sentence in every):
+        likewise = f" ({len(ones) - 1} likewise with other numbers)." if ones[1:] else "."
+        said.append(first.removesuffix(".") + likewise)
     return said
 
 
