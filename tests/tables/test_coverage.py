@@ -68,9 +68,9 @@ def test_intervals_and_verdicts_are_counted(tmp_path: Path) -> None:
     assert (k["quantity"], k["seeds"], k["confidence_percent"]) == ("k", 3, 90.0)
     assert k["coverage_percent"] == pytest.approx(100 * 2 / 3)
     assert k["bias_percent"] == pytest.approx(100 * np.mean(np.log([1.01, 1.02, 1.3])))
-    rows = verdict_counts(every_other, [file]).rows
-    found = {(row["quantity"], row["verdict"]): row for row in rows}
-    assert {row["seeds"] for row in rows} == {2}
+    counted = verdict_counts(every_other, [file]).rows
+    found = {(row["quantity"], row["verdict"]): row for row in counted}
+    assert {row["seeds"] for row in counted} == {2}
     names = "target", "reached", "true"
     assert [found["k", "determined"][name] for name in names] == [1.0, 1, 0]
     assert [found["k", "bounded below"][name] for name in names] == [1.0, 1, 1]
