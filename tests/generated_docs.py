@@ -29,14 +29,13 @@ from biogrip.command.words import in_sentences
 from biogrip.design import NO_BOUND, relative_bounds
 from biogrip.digits import plain as in_digits
 from biogrip.digits import with_unit
+from biogrip.files import read_table
 from biogrip.fit.least_squares import identify_many
 from biogrip.fit.problem import silent
 from biogrip.physics.drawing import sketched
 from biogrip.physics.models import ALIASES, MODELS
-from biogrip.physics.modes import linear_responses
 from biogrip.physics.noise import add_noise, standard_deviation, stream
-from biogrip.physics.simulation import simulated_response
-from biogrip.records import read_table
+from biogrip.physics.response import linear_responses, simulated_response
 from biogrip_study.config.study import Case
 from biogrip_study.page import answers
 from biogrip_study.records.identifications import share_in_words

@@ -11,7 +11,7 @@ from biogrip.cli import main
 from biogrip.design import NO_BOUND, Limits, Specimen
 from biogrip.library import simulate
 from biogrip.physics.protocol import sample_times
-from biogrip.physics.simulation import compute_grip
+from biogrip.physics.response import compute_grip
 from tests.helpers.default import study_of
 
 GRIPPER = """

@@ -7,6 +7,8 @@ def test_what_is_rounded_again_comes_out_as_if_once() -> None:
     assert {value: rounded(value) for value in shown} == shown
     assert [f"{rounded(value):.3g}" for value in shown] == [f"{value:.3g}" for value in shown]
     assert (rounded(None), rounded(1.165 - 1e-14)) == (None, 1.165)
+    # Six digits are enough of the first, and five of these six.
+    assert rounded(25.185482) == rounded(25.1855) == 25.186
 
 
 def test_numbers_are_as_fine_as_the_width_of_their_limits() -> None:

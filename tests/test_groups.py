@@ -651,8 +651,8 @@ def test_the_methods_say_what_was_compared_with_its_numbers(said: Said) -> None:
     text = " ".join(found.split())
     assert text.startswith(
         "The strain was recorded under 5, 7 Pa. Limits hold with "
-        "95 % confidence. 34 of 35 traces were used. Rejected: 1 (left01: The misfit is 4.5 times "
-        "the noise). Groups are those of dish: left 14 cells in 3 units; right 20 cells in 4 units."
+        "95 % confidence. 34 of 35 traces were used. Rejected: 1 (left01). "
+        "Groups are those of dish: left 14 cells in 3 units; right 20 cells in 4 units."
     )
     assert "The unit is the day" in text
     assert "Logarithms of means are compared by Welch's t test; p is not adjusted" in text

@@ -219,13 +219,13 @@ KINDS = {
     ),
     "typed by tests of onsets, contacts and damaged results": (
         *("--start says when", "). If it does, say --start fit", "say --contact fit"),
-        *(". Say when the protocol started (--start", "It is damaged: the same command with"),
+        *(" came. Say when the protocol started (--start", "It is damaged: the same command with"),
     ),
     "names an option whose value only its reader knows": (
         *(" rad, or less with a given noise (--noise) ", ", or it is below the noise: say how"),
-        *("The noise differs from one part", "what is before or after (--from, --until)"),
+        "what is before or after (--from, --until)",
         *("A ramp is given by --ramp DURATION", " % at the highest: correct for it, or leave"),
-        *(" times as much as the other: give standard", " A length is a strain by a scale or"),
+        " A length is a strain by a scale or",
         *(" A pressure sucks into a pipette", "that reading (--from)"),
         *(" Or say what is read, as by --reading ", ". Say which, as in --reading loss=COLUMN."),
         *("; give yours with --config.", " that was held, a column of it by --load, or a pro"),
@@ -235,7 +235,7 @@ KINDS = {
         *("--output", "--report", "--csv", "--plot", "--unit: found", ": goes with --hold"),
         *(" For several there is --report", "takes the shape of a tip"),
         "'; allowed is a table that `biogrip identify --csv` wrote",
-        *("with __use_yte__", "snakemake -j2 --configfile ", "--hold", "--ramp"),
+        *("snakemake -j2 --configfile ", "--hold", "--ramp"),
     ),
 }
 

@@ -22,7 +22,7 @@ from biogrip.cli import _parser, main
 from biogrip.command.options import Setting
 from biogrip.command.outputs import WRITTEN_BY, Outcome, table_of
 from biogrip.command.settings import Asked, case_of
-from biogrip.command.words import for_a_paper, in_columns, noise_in_words
+from biogrip.command.words import in_columns, noise_in_words
 from biogrip.config.source import HOLD
 from biogrip.errors import BiogripError
 from biogrip.judging.doubts import REJECTION
@@ -235,11 +235,11 @@ def test_text_that_is_no_value_of_an_option_is_refused() -> None:
     for option, text, said in (
         *(("--fix", text, "allowed is NAME=VALUE") for text in ("k", "k=much", "=1")),
         *(("--set", text, "allowed is KEY=VALUE") for text in ("k", "=1")),
-        ("--start", "soon", "found 'soon', allowed is a number of seconds, or fit"),
-        ("--hold", "0", "allowed is a number, and not 0"),
+        ("--start", "soon", "found 'soon', allowed is SECONDS: the protocol's start on the clock"),
+        ("--hold", "0", "found '0', allowed is VALUE: what was held"),
         *(("--hold", text, "allowed is a number, or one with") for text in ("nan", "much")),
         ("--hold", "-5,0%", "a decimal comma? Allowed is a point"),
-        ("--set", "a.b=[1", "a.b: not valid YAML: "),
+        ("--set", "a.b=[1", "a.b: not usable YAML: "),
         ("--set", "a.b=1:30", "a.b: found 1:30, which YAML reads in base 60"),
     ):
         with redirect_stderr(StringIO()) as error, pytest.raises(SystemExit):
@@ -340,7 +340,7 @@ def test_all_that_is_assumed_repeats_it(tmp_path: Path) -> None:
 def test_advice_is_given_of_a_rejected_fit_alone() -> None:
     rejected = {"fit": "rejected", "notes": [{"weight": REJECTION, "text": "It is wrong."}]}
     found = example()[1] | {"advice": "Try another."}
-    lines = in_columns([found | rejected, found], {}).splitlines()
+    lines = in_columns([found | rejected, found | {"trace": "other.csv"}], {}).splitlines()
     assert [line for line in lines if "Try" in line] == [f"{EXAMPLE}: Try another."]
     assert f"{EXAMPLE}: rejected: It is wrong." in lines
     (row,) = (line for line in lines if "  ok  " in line)
@@ -363,22 +363,6 @@ def test_a_terminal_sees_every_phase(tmp_path: Path, few: Path) -> None:
         assert phase in said
     # The line of the phases is gone before anything is told.
     assert "\r\x1b[K" in said.split(str(trace))[-2]
-
-
-def test_only_what_can_be_published_is_said_for_a_paper() -> None:
-    both = {"quantity": "c + c_p", "symbol": "$c + c_{p}$", "unit": "N s/m", "value": 2e-9}
-    both |= {"low": 1e-9, "high": 40.0, "provided": "it relaxes"}
-    ends: list[Any] = [{"low": None}, {"high": None}, {"low": None, "high": None}]
-    quantities = [both, *(both | own | {"provided": None} for own in ends)]
-    found = {"fit": "ok", "confidence": 0.95, "quantities": quantities}
-    for fit in ("doubtful", "rejected"):
-        assert for_a_paper(found | {"fit": fit}) == []
-    assert for_a_paper(found) == [
-        "c + c_p = 2e-09 N s/m (95 % profile-likelihood interval 1e-09 to 40, n = 1 trace, "
-        "provided it relaxes)",
-        "c + c_p < 40 N s/m (97.5 % one-sided limit, n = 1 trace)",
-        "c + c_p > 1e-09 N s/m (97.5 % one-sided limit, n = 1 trace)",
-    ]
 
 
 def test_noise_is_named_by_who_says_what_it_is() -> None:

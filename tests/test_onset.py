@@ -240,16 +240,11 @@ def test_a_clock_may_count_seconds_since_1970() -> None:
 
 
 @pytest.mark.parametrize(
-    ("model", "reads", "fit", "said"),
-    [
-        ("maxwell", "force", "doubtful", "any time from 0 to 16.4 s of the clock, the trace fits "),
-        ("kelvin_voigt", "strain", "rejected", "16 s of the"),
-    ],
+    ("model", "reads", "fit"),
+    [("maxwell", "force", "doubtful"), ("kelvin_voigt", "strain", "rejected")],
 )
-def test_a_hold_on_the_clock_of_the_whole_test_is_not_ok(
-    model: str, reads: str, fit: str, said: str
-) -> None:
-    """Exponentials look alike from any start; where readings show another, advice is that."""
+def test_a_hold_on_the_clock_of_the_whole_test_is_not_ok(model: str, reads: str, fit: str) -> None:
+    """Exponentials look alike from any start; where readings show another, the fit is rejected."""
     left = np.exp(-HOLD / 8)
     clean, held = (2.0 * left, 1e-3) if reads == "force" else ((1 - left) / 100, 1.0)
     values = clean + 2e-3 * clean.max() * np.random.default_rng(3).standard_normal(len(HOLD))
@@ -257,7 +252,6 @@ def test_a_hold_on_the_clock_of_the_whole_test_is_not_ok(
     status, notes = notes_on(HOLD + 16, values, **given)
     assert (status, "drifts" in notes) == (fit, False)
     assert "The readings begin 16.4 s after the step of the protocol" in notes
-    assert f"If it starts at {said}" in notes
     status, notes = notes_on(HOLD + 16, values, start=16.0, **given)
     assert (status, "begin" in notes) == ("ok", False)
 
@@ -276,17 +270,6 @@ def test_a_ramp_before_the_first_reading_is_said_to_change_values() -> None:
     phases = {"phases": [ramped, {"duration_s": 300.0, "strain": 1.0}]}
     protocol = {"instrument": "relaxation", "protocol": phases}
     assert "If the load was no step" not in notes_on(times, values, config=protocol, **given)[1]
-
-
-@pytest.mark.nightly
-def test_a_start_between_0_and_the_first_reading_is_found() -> None:
-    """Of a power law, which no other start fits; it is good to half a per cent with one at 0."""
-    times: Array = 1.0 + 0.02 * np.arange(1000.0)
-    values = (times - 0.6) ** 0.4 + 0.004 * np.random.default_rng(0).standard_normal(len(times))
-    status, notes = notes_on(times, values, reads="strain", model="power_law", hold=1.0)
-    assert status == "doubtful"
-    (start_s,) = re.findall("If it starts at (.*?) s of the clock, the fit is far better", notes)
-    assert float(start_s) == pytest.approx(0.6, abs=0.005)
 
 
 @pytest.mark.parametrize("readings", [6, 12])

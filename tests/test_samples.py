@@ -10,7 +10,10 @@ import pandas as pd
 import pytest
 
 from biogrip.cli import main
-from biogrip.command.words import agreement_in_words, for_a_paper, set_up_in_words
+from biogrip.command.files import identify_files
+from biogrip.command.options import Setting
+from biogrip.command.outputs import join_tables
+from biogrip.command.words import agreement_in_words, set_up_in_words
 
 OPTIONS = ["--reading", "strain", "--model", "zener_kelvin", "--no-compare"]
 
@@ -79,9 +82,6 @@ def test_of_traces_that_agree_the_answer_is_said(folder: Path) -> None:
     assert said.startswith("The 2 traces agree with one linear sample (p = ")
     low, high = map(float, re.findall(r"\((\S+) to (\S+)\) for .*a none 10.csv", said)[0])
     assert low < 1 < high
-    sentences = for_a_paper(found)
-    assert len(sentences) == 4
-    assert all(it.endswith("n = 2 traces of one sample)") for it in sentences)
     assert "under a stress of 5, 10 Pa from" in " ".join(set_up_in_words(found))
     assert {q["quantity"] for q in found["without_model"]["quantities"]} > {"J(10 s)"}
 
@@ -146,3 +146,22 @@ def test_a_trace_that_cannot_be_read_costs_its_sample_only(tmp_path: Path) -> No
     assert list(found["fit"]) == ["ok", "failed", "failed"]
     assert "broken.csv, line 2" in found.loc["two", "failed"]
     assert "gone.csv" in found.loc["three", "failed"]
+
+
+def test_rows_one_by_one_give_the_table_of_all(folder: Path, tmp_path: Path) -> None:
+    """One in which no trace was read alone tells no unit of the noise."""
+    (tmp_path / "broken.csv").write_text("time_s,strain\n0,x\n1,y\n")
+    names = ["broken.csv", "a none 5.csv", "alone.csv", "a none 10.csv"]
+    for name in names[1:]:
+        (tmp_path / name).write_bytes((folder / name).read_bytes())
+    rows = [f"{name},5 Pa,strain,{'gel' * ('none' in name)}" for name in names]
+    assert identify(tmp_path, "file,hold,reading,sample", *rows) == 1
+    (tmp_path / "found.csv").rename(tmp_path / "whole.csv")
+    parts = [tmp_path / f"{row}-{row}.csv" for row in range(3)]
+    settings = [Setting("", ("sample", "model"), "zener_kelvin")]
+    settings.append(Setting("", ("model_selection", "models"), []))
+    for row, part in enumerate(parts):
+        table = [tmp_path / "cells.csv"]
+        identify_files(table, None, settings, table=part, rows=(row, row))
+    join_tables(parts, tmp_path / "joined.csv", 3)
+    assert (tmp_path / "joined.csv").read_text() == (tmp_path / "whole.csv").read_text()

@@ -14,7 +14,7 @@ from tests.helpers.identified import FEW, write_drop
 BEGIN = """
 import atexit, os, sys, time
 from pathlib import Path
-from biogrip.processes import end_when_stopped
+from biogrip.terminal import end_when_stopped
 def stop():
     print("said before")
     os.kill(os.getpid(), {number})
@@ -100,6 +100,21 @@ def test_a_link_in_the_place_of_a_scratch_file_is_not_followed(tmp_path: Path) -
         assert {it.name for it in tmp_path.iterdir()} == {"found.csv", "victim.txt"}
 
 
+def test_what_a_killed_process_has_left_goes_with_the_next_write(tmp_path: Path) -> None:
+    """But not what one that still runs is writing, nor what only looks like it."""
+    (over := subprocess.Popen(["true"])).wait()
+    file = tmp_path / "found[1].csv"
+    kept = [
+        f".{file.name}.{os.getppid()}.part",
+        f".{file.name}.old.part",
+        f".1.csv.{over.pid}.part",
+    ]
+    for name in (f".{file.name}.{over.pid}.part", *kept):
+        (tmp_path / name).write_text("a,")
+    write_text(file, "a,b\n")
+    assert {it.name for it in tmp_path.iterdir()} == {file.name, *kept}
+
+
 def test_what_is_ignored_stays_so(tmp_path: Path) -> None:
     code = f"import signal; signal.signal({signal.SIGINT}, signal.SIG_IGN)"
     code += BEGIN + f"os.kill(os.getpid(), {signal.SIGINT}); print('goes on')"
@@ -111,7 +126,7 @@ def test_it_can_be_stopped_before_it_loads_anything_large(tmp_path: Path) -> Non
     code = "import sys; b = {*sys.modules}; import biogrip.__main__; print(*{*sys.modules} - b)"
     loaded = set(ended(code, tmp_path)[1].split())
     ours = {name for name in loaded if name.startswith("biogrip")}
-    assert ours == {"biogrip", "biogrip.__main__", "biogrip.processes", "biogrip.terminal"}
+    assert ours == {"biogrip", "biogrip.__main__", "biogrip.terminal"}
     assert not {"argparse", "json", "typing", "hashlib", "pathlib"} & loaded
 
 

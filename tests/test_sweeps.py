@@ -16,11 +16,12 @@ from biogrip.cli import _parser
 from biogrip.command.settings import Asked, read_trace
 from biogrip.command.words import set_up_in_words
 from biogrip.errors import BiogripError
-from biogrip.fit.swept_noise import estimate_swept_noise
-from biogrip.judging.whiteness import about_moduli, find_inertia
+from biogrip.fit.share_noise import estimate_swept_noise
+from biogrip.fit.trace_noise import PairWhitening
+from biogrip.judging.whiteness import find_inertia
 from biogrip.library import INSTRUMENTS, Sample, hold, set_up, simulate
 from biogrip.physics.models import MODELS
-from biogrip.physics.noise import PairWhitening, moduli_of, places_of
+from biogrip.physics.noise import moduli_of, places_of
 from biogrip.physics.protocol import joined
 from tests.helpers.default import seen
 from tests.helpers.identified import by_quantity, identified, identify, told, write_trace
@@ -349,9 +350,10 @@ def test_inertia_is_said_as_a_share_of_the_highest_storage_modulus() -> None:
     residual = np.array([0.1, 0.0, 0.0, 2.0, 8.0, 18.0])
     read = seen(time_s=places, readings=[357.2], condensed=seen(cleared=lambda rows: rows))
     given = seen(trace=read, freedom=9.0), residual, np.zeros((0, 6))
-    assert ", 5 % at" in find_inertia(*given)[1]
-    (said,) = about_moduli(*given, np.ones(6))
-    assert said.startswith("The fit leaves what is of inertia of the instrument or the sample, as")
+    told, said = find_inertia(*given)
+    assert told
+    assert said.startswith("inertia of the instrument or the sample, as")
+    assert ", 5 % at" in said
 
 
 def test_what_was_assumed_is_a_config_that_repeats_it(tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 import csv
 import json
+import multiprocessing
 import os
 import signal
 from pathlib import Path
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 from biogrip.command import files as command
+from biogrip.command.files import identify_batch
 from biogrip.command.options import Setting
 from biogrip.command.outputs import read_result, write_result
 from biogrip.command.settings import Asked
@@ -139,7 +141,7 @@ def test_all_that_is_wrong_with_a_table_is_said_at_once(tmp_path: Path) -> None:
         f"4, column 'file': found '{tmp_path}/a.csv' again, as on line 3; allowed is each trace "
         "once, or a column 'reading' that tells which, as in strain=COLUMN.",
     ]
-    assert below == [[f"{n}, column 'measurement.skip'", " not valid YAML"] for n in (3, 4)]
+    assert below == [[f"{n}, column 'measurement.skip'", " not usable YAML"] for n in (3, 4)]
     write(path, "file|fixed.c", *(f"{number}.csv|[1" for number in range(30)))
     assert refused(path)[10:] == ["... and 20 more."]
 
@@ -198,18 +200,17 @@ def test_a_trace_that_fails_is_a_row_that_says_why(here: Path) -> None:
         assert '<td class="aside">lost</td>' in (here / "page.html").read_text()
 
 
+def killed_at_other(asked: Any, outputs: Any, *, drawn: bool) -> Any:
+    if any(own.trace.name == "other.csv" for own in asked):
+        os.kill(os.getpid(), signal.SIGKILL)
+    return identify_batch(asked, outputs, drawn=drawn)
+
+
 @pytest.mark.nightly
 def test_a_killed_process_costs_a_batch_its_trace_alone(
     here: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """And what is done is not done again: the next run says and writes what a first would."""
-    whole = command.identify_batch
-
-    def killed(asked: Any, outputs: Any, *, drawn: bool) -> Any:
-        if any(own.trace.name == "other.csv" for own in asked):
-            os.kill(os.getpid(), signal.SIGKILL)
-        return whole(asked, outputs, drawn=drawn)
-
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0})
     # Traces of one batch, each with limits of its own.
     of_each = f"{HEADER}|identifiability.confidence", "usual.csv|left||||0.9", f"{OTHER}|"
@@ -221,7 +222,7 @@ def test_a_killed_process_costs_a_batch_its_trace_alone(
         path.unlink()
     with monkeypatch.context() as patched:
         # Killed is every process that is to identify that trace, with all others of its batch.
-        patched.setattr(command, "identify_batch", killed)
+        patched.setattr(command, "identify_batch", killed_at_other)
         status, printed, said = identify("cells.tsv", "--csv", "found.csv")
     assert status == 1
     assert "its traces are identified one by one." in said
@@ -333,5 +334,5 @@ def test_jobs_are_done_one_after_another_where_nothing_forks(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """As on Windows."""
-    monkeypatch.setattr(command, "get_all_start_methods", lambda: ["spawn"])
+    monkeypatch.setattr(multiprocessing, "get_all_start_methods", lambda: ["spawn"])
     assert [*command.side_by_side(abs, [-1, 2, -3], 2)] == [1, 2, 3]

@@ -13,9 +13,9 @@ from biogrip.command import files as command
 from biogrip.command.files import identify_batch
 from biogrip.command.options import Setting
 from biogrip.command.outputs import Outcome
-from biogrip.command.page import beyond, common, draw_every_trace, write_page
+from biogrip.command.page import common, draw_every_trace, write_page
 from biogrip.command.settings import Asked
-from biogrip.command.words import columns_of, for_a_paper
+from biogrip.command.words import columns_of
 from tests.helpers.identified import write_drop
 from tests.helpers.places import EXAMPLE
 
@@ -63,15 +63,19 @@ def page(dish: Outcome, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_page_begins_with_status_value_and_interval(example: Outcome, tmp_path: Path) -> None:
     write_page(example, tmp_path / "page.html")
     text = unescape((tmp_path / "page.html").read_text())
-    parts = ("its best fit", "Fit ok", "What the trace tells", "Profile likelihoods", "For a paper")
+    parts = (
+        "its best fit",
+        "Fit ok",
+        "What the trace tells",
+        "Profile likelihoods",
+        "Methods, for a paper",
+    )
     places = [text.index(part) for part in parts]
     assert places == sorted(places)
     assert "Each trace" not in text
     unfolded = re.sub("<details>.*?</details>", "", text, flags=re.DOTALL)
     assert "search_range:" in text
     assert "search_range:" not in unfolded
-    lines = for_a_paper(example.found[0])
-    assert len(lines) == sum(f"<p>{line}</p>" in text for line in lines) == 6
 
 
 def test_pictures_are_small_and_in_the_page(page: Path) -> None:
@@ -117,11 +121,9 @@ def test_the_figure_is_by_the_words_of_the_table(dish: Outcome) -> None:
 
 def test_what_all_share_is_said_once() -> None:
     one = {"noise": {"kind": "white", "level": 0.1}, "rate": 2.0, "range": {"k": 1}}
-    other = {"noise": {"kind": "white", "level": 0.2}, "rate": 2.0, "range": {"k": 2}}
-    shared = common([one, other])
-    assert shared == {"noise": {"kind": "white"}, "rate": 2.0}
-    assert beyond(one, shared) == {"noise": {"level": 0.1}, "range": {"k": 1}}
-    assert beyond(other, common([other])) == {}
+    other = {"noise": {"kind": "white", "level": 0.2}, "rate": 2.0, "range": {"k": 1}}
+    assert common([one, other]) == {"rate": 2.0, "range": {"k": 1}}
+    assert common([other]) == other
 
 
 def test_the_methods_have_the_numbers_of_the_study(page: Path) -> None:
@@ -131,9 +133,9 @@ def test_the_methods_have_the_numbers_of_the_study(page: Path) -> None:
         "a torque of 1.6·10⁻⁹ N m for 200 s, then of 3.2·10⁻¹⁰ N m for 200 s. Its arms of 0.0015 m "
         "have a stiffness of 4.4·10⁻⁷ N m/rad, and stand at 75 degrees. The model (generalized "
         "Maxwell-Wiechert) was fitted by least squares; the noise was taken from the scatter",
-        "holds with 97.5 % confidence, one-sided. 11 of 13",
-        "11 of 13 traces were used, 1 of them with a doubtful fit. Rejected: 1 (dish/8.csv: "
-        "Something is odd). Not identified: 1 (bad.csv: found 'high'). Computed with biogrip 1.0.0",
+        "One-sided limits hold with 97.5 % confidence. 11 of 13",
+        "11 of 13 traces were used, 1 of them with a doubtful fit. Rejected: 1 (dish/8.csv). "
+        "Not identified: 1 (bad.csv). Computed with biogrip 1.0.0",
     ):
         assert words in said
 

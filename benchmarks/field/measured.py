@@ -27,7 +27,7 @@ from biogrip.fit.experiment import Experiment
 from biogrip.fit.problem import Fit
 from biogrip.identify.prepare import prepare, ranges_of
 from biogrip.judging.diagnosis import diagnose
-from biogrip.judging.verdicts import DETERMINED
+from biogrip.judging.profiles import DETERMINED
 from biogrip.library import Phase, Sample, hold, identify_sample, one_blas_thread, simulate
 from biogrip.traces.reader import Recording, read_recording
 from biogrip_study.config.study import load_study

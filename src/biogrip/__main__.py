@@ -2,8 +2,7 @@
 
 import sys
 
-from biogrip.processes import collect_less, end_when_stopped
-from biogrip.terminal import open_closed_streams
+from biogrip.terminal import collect_less, end_when_stopped, open_closed_streams
 
 
 def main() -> int:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from biogrip import __version__
-from biogrip.command.options import GROUPS, REPLACED, Setting
+from biogrip.command.options import GROUPS, Setting, setting_of
 from biogrip.errors import BiogripError, nearest
 from biogrip.terminal import visible, visible_lines
 
@@ -73,8 +73,6 @@ class _Parser(argparse.ArgumentParser):
         parsed, unknown = super().parse_known_args(args, namespace)
         if unknown:
             option = unknown[0].partition("=")[0]
-            if new := REPLACED.get(option.removeprefix("--")):
-                self.error(f"{option}: is now --{new}, as in --{new} 'sphere 2.5 um'.")
             near = nearest(option, self._option_string_actions)
             self.error(f"unrecognized arguments: {' '.join(unknown)}.{near}")
         return parsed, unknown
@@ -127,30 +125,16 @@ def _parser(kind: type[_Parser] = _Parser) -> argparse.ArgumentParser:
     return parser
 
 
-def _with_message(reader: Callable[[str], Any]) -> Callable[[str], Any]:
-    """Return a reader whose message argparse shows."""
+def _setting(option: str) -> Callable[[str], Setting]:
+    """Return what makes a setting of an option's value, with a message that argparse shows."""
 
-    def read(text: str) -> Any:
+    def set_to(text: str) -> Setting:
         try:
-            return reader(text)
-        except ValueError as error:
+            return setting_of(option, text)
+        except BiogripError as error:
             raise argparse.ArgumentTypeError(str(error)) from error
 
-    return read
-
-
-class _Set(argparse.Action):
-    """Append what an option sets: the path of a config key, by default `dest`, and its value."""
-
-    def __call__(
-        self, parser: Any, namespace: argparse.Namespace, values: Any, option: str | None = None
-    ) -> None:
-        path, value = tuple(self.dest.split(".")), values
-        if isinstance(values, tuple):
-            path, value = values
-        elif self.nargs == 0:
-            value = not str(option).startswith("--no-") if self.const is None else self.const
-        namespace.settings = [*namespace.settings, Setting(str(option), path, value)]
+    return set_to
 
 
 def _add_settings(parser: Any) -> None:
@@ -166,22 +150,26 @@ def _add_settings(parser: Any) -> None:
     )
     text = "all traces are of one sample, which they tell together (a table: column sample)"
     parser.add_argument("--together", action="store_true", help=text)
+
+    def add(group: Any, name: str, action: str, text: str, **more: Any) -> None:
+        group.add_argument(name, action=action, dest="settings", help=text, **more)
+
     for title, options in GROUPS.items():
         group = parser.add_argument_group(title)
-        for name, metavar, key, text in options:
-            names = [name] if metavar else [name, name.replace("--", "--no-")]
-            of_key: dict[str, Any] = (
-                {"dest": key} if isinstance(key, str) else {"type": _with_message(key)}
-            )
-            of_key |= {"metavar": metavar} if metavar else {"nargs": 0}
-            group.add_argument(*names, action=_Set, help=text, **of_key)
+        for name, metavar, _, text in options:
+            if metavar:
+                add(group, name, "append", text, metavar=metavar, type=_setting(name[2:]))
+                continue
+            add(group, name, "append_const", text, const=setting_of(name[2:], "true"))
+            no = setting_of(name[2:], "false", name.replace("--", "--no-"))
+            add(group, no.by, "append_const", argparse.SUPPRESS, const=no)
         if title == "what was done":
             text = "YAML file with your gripper, protocol, search range, ..."
             group.add_argument("--config", type=Path, help=text)
         if title == "the sample":
-            of_key = {"dest": "model_selection.models", "nargs": 0, "const": []}
             text = "do not try other models, which takes long where none fits"
-            group.add_argument("--no-compare", action=_Set, help=text, **of_key)
+            alone = Setting("--no-compare", ("model_selection", "models"), [])
+            add(group, "--no-compare", "append_const", text, const=alone)
             group = parser.add_argument_group("output")
             _add_file(group, "--report", "PAGE", "HTML page with pictures")
             _add_file(group, "--csv", "TABLE", "CSV file, a row per trace", dest="table")

@@ -28,11 +28,14 @@ from biogrip.config.trace_blocks import SampleBlocks
 from biogrip.digits import significant, with_unit
 from biogrip.errors import BiogripError
 from biogrip.files import write_text
-from biogrip.physics.modes import linear_responses
 from biogrip.physics.noise import standard_deviation, without
 from biogrip.physics.protocol import Phase, hold, join_phases, largest_load, sample_times
-from biogrip.physics.response import linear_jaw_force
-from biogrip.physics.simulation import compute_grip, simulated_response
+from biogrip.physics.response import (
+    compute_grip,
+    linear_jaw_force,
+    linear_responses,
+    simulated_response,
+)
 from biogrip.terminal import aligned, visible_lines
 
 GENERATIONS = 500

@@ -22,15 +22,15 @@ _TENS = np.array([float(f"1e{exponent}") for exponent in range(-_LARGEST, _LARGE
 def rounded(value: float | None) -> float | None:
     """Round to five significant digits, or more if later rounding to fewer would change.
 
-    For example, 1.16499 is 1.16 to three digits, but 1.165 is 1.17.
+    For example, 1.16499 is 1.16 to three digits, but 1.165 is 1.17. What is rounded stays if it is
+    rounded again.
     """
     if value is None:
         return None
     for digits in range(_ROUNDED_DIGITS, _MOST_ROUNDED_DIGITS):
         shorter = float(f"{value:.{digits}g}")
-        fewer = range(2, _ROUNDED_DIGITS)
-        if shorter == value or all(f"{shorter:.{few}g}" == f"{value:.{few}g}" for few in fewer):
-            return shorter
+        if all(f"{shorter:.{few}g}" == f"{value:.{few}g}" for few in range(2, _ROUNDED_DIGITS)):
+            return shorter if shorter == value or digits == _ROUNDED_DIGITS else rounded(shorter)
     return float(f"{value:.{_ROUNDED_DIGITS}g}")
 
 

@@ -1,17 +1,36 @@
-"""Atomic writing of files, and digests of what is in files."""
+"""How files are written, atomically, and read again: CSV with a header, and JSON; digests of files.
 
+Text that a spreadsheet would take for a formula is written to CSV with an apostrophe before it, and
+read without. A reader raises a `BiogripError` that names a file which is missing, damaged or of
+another kind. Cells of a CSV file may be edited; its lines have to be whole.
+"""
+
+import csv
 import hashlib
+import json
 import os
-from collections.abc import Iterator
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import cache
 from importlib.metadata import version
+from io import StringIO
+from itertools import chain
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 from biogrip import __version__
 from biogrip.errors import BiogripError
-from biogrip.processes import unfinished
-from biogrip.terminal import visible
+from biogrip.terminal import unfinished, visible
+
+# A cell that a spreadsheet takes for a formula, and signed numbers, which it does not.
+_FORMULA = re.compile(r"'*[=+@\t\r-]")
+_SIGNED = re.compile(r"[+-]\d+(\.\d+)?(e[+-]?\d+)?|-(inf)?")
+# With this end of a line, `csv` puts quotes around both of its characters in a cell.
+_END = "\r\n"
+AGAIN = "It is damaged: the same command with --forcerun and this file makes it again."
+"""What to do about a result that is not as it was written."""
 
 
 @contextmanager
@@ -26,6 +45,10 @@ def atomic_write(path: Path) -> Iterator[Path]:
     unfinished.add(str(scratch))
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
+        for left in left_in(path.parent, ".*.[0-9]*.part"):
+            # What has another name may be another machine's, which goes on.
+            if left.name.startswith(f".{path.name}."):
+                left.unlink(missing_ok=True)
         # A link that somebody has put there is not followed.
         scratch.unlink(missing_ok=True)
         scratch.touch(exist_ok=False)
@@ -60,6 +83,13 @@ def scratch_path(path: Path) -> Path:
     return path.with_name(f".{path.name}.{os.getpid()}.part")
 
 
+@cache
+def left_in(folder: Path, pattern: str) -> list[Path]:
+    """Return what killed processes have left, whose number stands before the last dot."""
+    every = folder.glob(pattern) if os.path.exists("/proc/self") else ()
+    return [it for it in every if not os.path.exists(f"/proc/{it.name.split('.')[-2]}")]
+
+
 def write_text(path: Path, text: str) -> None:
     """Write a text file atomically."""
     with atomic_write(path) as scratch:
@@ -83,9 +113,84 @@ def software(*others: Path) -> dict[str, str]:
         for file in sorted(folder.rglob("*"))
         if file.suffix in (".py", ".yaml", ".j2", ".css", ".js")
     )
+    digest = hashlib.sha256(source.encode()).hexdigest()[:12]
     versions = {name: version(name) for name in ("numpy", "scipy")}
-    return {
-        "biogrip": __version__,
-        **versions,
-        "source": hashlib.sha256(source.encode()).hexdigest()[:12],
-    }
+    return {"biogrip": __version__, **versions, "source": digest}
+
+
+def write_rows(path: Path, columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
+    """Write a header and rows, escaping text that a spreadsheet would take for a formula."""
+    with (
+        atomic_write(path) as scratch,
+        # File names may hold bytes that are not valid text.
+        scratch.open("w", encoding="utf-8", errors="backslashreplace", newline="") as stream,
+    ):
+        lines = SimpleNamespace(write=lambda row: stream.write(row.removesuffix(_END) + "\n"))
+        writer = csv.writer(lines, lineterminator=_END)
+        for row in chain((columns,), rows):
+            cells = [escape_formula(cell) if isinstance(cell, str) else cell for cell in row]
+            writer.writerow(cells)
+
+
+def escape_formula(text: str) -> str:
+    """Return text that a spreadsheet takes for no formula; signed numbers stay as they are."""
+    return f"'{text}" if _FORMULA.match(text) and not _SIGNED.fullmatch(text) else text
+
+
+def as_it_was(cell: Any) -> Any:
+    """Undo `escape_formula`; anything else is returned unchanged."""
+    ours = isinstance(cell, str) and cell[:1] == "'" and _FORMULA.match(cell)
+    return cell[1:] if ours else cell
+
+
+def whole(path: Path, what: str = "a table", again: str = f" {AGAIN}") -> str:
+    """Return the text of a CSV file, in which each row must have all cells.
+
+    The last line must have an end, too, if the same command makes the file again.
+    """
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as stream:
+            text = stream.read() if again else stream.read().rstrip("\r\n") + "\n"
+        if "\0" in text:
+            raise ValueError("found a byte of 0")
+        widths = [len(row) for row in csv.reader(StringIO(text, newline=""), strict=True)]
+    except (OSError, ValueError, csv.Error) as error:
+        raise BiogripError(f"{path}: cannot be read as {what}: {error}.{again}") from error
+    short = [line for line, width in enumerate(widths, start=1) if width != widths[0]]
+    if short or not text.endswith("\n"):
+        line = short[0] if short else len(widths)
+        raise BiogripError(f"{path}, line {line}: part of the line is missing.{again}")
+    return text
+
+
+def read_rows(path: Path, again: str = "") -> list[list[str]]:
+    """Read the header and all rows of a file, by default a user's, as text, see `whole`."""
+    text = whole(path, again=again)
+    return [[*map(as_it_was, row)] for row in csv.reader(StringIO(text, newline=""))]
+
+
+def read_table(path: Path) -> list[dict[str, str]]:
+    """Read the rows of a table as text by column."""
+    header, *rows = read_rows(path, f" {AGAIN}")
+    return [dict(zip(header, row, strict=True)) for row in rows]
+
+
+def write_object(path: Path, plain: Mapping[str, Any], made_from: str = "") -> None:
+    """Write plain data as JSON, with a digest of them and of what they were made from."""
+    write_text(path, json.dumps({**plain, "digest": _digest(plain, made_from)}, indent=1) + "\n")
+
+
+def read_object(path: Path, kind: str, made_from: str = "") -> dict[str, Any]:
+    """Read what `write_object` wrote; a `BiogripError` says that it is something else."""
+    try:
+        found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        if found.pop("digest") == _digest(found, made_from):
+            return found
+        problem = "its digest is another one"
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
+        problem = str(error)
+    raise BiogripError(f"{path}: cannot be read as {kind}: {problem}. {AGAIN}")
+
+
+def _digest(plain: Mapping[str, Any], made_from: str) -> str:
+    return hashlib.sha256(f"{json.dumps(plain)}{made_from}".encode()).hexdigest()[:16]

@@ -14,21 +14,20 @@ from typing import Any, NoReturn
 
 from biogrip import __version__
 from biogrip.command.outputs import COLUMNS as OF_TRACES
-from biogrip.command.outputs import FAILED, LINEAR, METHODS, REASONS, WRITTEN_BY, check_outputs
+from biogrip.command.outputs import FAILED, LINEAR, METHODS, WRITTEN_BY, check_outputs
 from biogrip.command.words import in_sentences, outcome_in_words, paragraph, together
 from biogrip.digits import counted, plain, rounded_numbers, with_limits, with_unit
 from biogrip.errors import BiogripError, nearest
-from biogrip.files import atomic_write
+from biogrip.files import atomic_write, read_rows, write_rows
 from biogrip.judging.cells import COLUMNS, Cell, Compared, Told, compare, gather, shared_columns
 from biogrip.judging.doubts import DOUBTFUL, OK, REJECTED
-from biogrip.judging.verdicts import (
+from biogrip.judging.profiles import (
     BOUNDED_ABOVE,
     BOUNDED_BELOW,
     DETERMINED,
     FIT_REJECTED,
     NOT_DETERMINED,
 )
-from biogrip.records import read_rows, write_rows
 from biogrip.terminal import aligned, visible, visible_lines
 from biogrip.traces.columns import trace_file_problem
 
@@ -375,9 +374,7 @@ def _without_doubtful(grouped: _Grouped, cells: Sequence[Cell]) -> Iterator[str]
 def _for_a_paper(grouped: _Grouped, cells: Sequence[Cell], compared: Compared) -> str:
     """Return a paragraph on how traces were identified, and groups compared."""
     made = (in_sentences(trace[METHODS]) for trace in grouped.used if trace.get(METHODS))
-    outcome = (
-        (it["trace"], it["fit"], it.get(REASONS) or it.get(FAILED, "")) for it in grouped.traces
-    )
+    outcome = ((trace["trace"], trace["fit"]) for trace in grouped.traces)
     version = max(trace.get(WRITTEN_BY, "") for trace in grouped.used) or __version__
     tests = _tests(grouped, cells, [*compared.values()])
     return paragraph([*together(made), *outcome_in_words(outcome), *tests], version)

@@ -64,12 +64,6 @@ IN_ONE_STRETCH = 0.3
 """Share of the sum of squares that none of 20 stretches has of stationary noise which is correlated
 for less than half a stretch: what has it is no such noise."""
 
-UNEVEN = 3.0
-"""Ratio of the scatter of stretches, which white noise exceeds in 20 of them once in hundreds."""
-
-AS_THE_SCATTER = 1.44
-"""Mean square over that of the scatter up to which noise may be white: 1.05 to 1.4 if it is."""
-
 TOLD = 0.03
 """Least share of a reading's variance, or of a step's squares, that a fit leaves where it is told:
 a fit that absorbs more follows the reading. Chosen."""
@@ -87,12 +81,9 @@ intervals, as a share, with which it has a spectrum. Chosen."""
 
 # The start of a protocol.
 
-SURELY, AS_GOOD = 1e-9, 1e-3
-"""Levels of the tests for a late start or another clock, so that correlated noise does not look
-like one, and for a tare or a clock that fits as well, one trace in a thousand."""
-
-UNLIKE = 0.05
-"""Level at which another start fits worse than the best: 5 %, as that of limits."""
+SURELY = 1e-9
+"""Level of the tests for a late start and a tare, so that correlated noise does not look like
+one."""
 
 CONSTANT, CONSTANT_OF_PEAK, FEWEST_BEFORE = 2.0, 1e-3, 3
 """Standard deviation of constant readings, in noise and in peaks of noise-free traces, and fewest

@@ -3,7 +3,6 @@
 The commands and the workflow use the same functions. Columns of pandas do as arrays.
 """
 
-import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -32,7 +31,7 @@ from biogrip.physics.instruments import GRIPPER, INSTRUMENTS, Instrument
 from biogrip.physics.models import Sample
 from biogrip.physics.noise import Noise, add_noise
 from biogrip.physics.protocol import Phase, hold
-from biogrip.physics.simulation import simulated_response
+from biogrip.physics.response import simulated_response
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -44,32 +43,6 @@ one_blas_thread: Callable[[_Function], _Function] = threadpool_limits.wrap(
     limits=1, user_api="blas"
 )
 """Decorator of what fits: its matrices are small, and BLAS threads cost more than they bring."""
-
-# Options of the command in what it says, and the arguments and keys that they are here.
-_ARGUMENTS = (
-    ("--reading loss=COLUMN", "loss=..."),
-    ("--start fit", 'start="fit"'),
-    ("--ramp DURATION", "ramp=..."),
-    ("--offset --drift", "offset=True, drift=True"),
-    ("--(offset|drift)", r"\1=True"),
-    (r"--model (\w+)", r'model="\1"'),
-    (r"--noise-model (\w+)", r'noise_model="\1"'),
-    (r"--noise-share (\S+)\.", r"noise_share=\1."),
-    ("--(from|until)", r"measurement.\1_s in config"),
-    ("--load", "measurement.load of the command"),
-    ("--(?=[a-z])", ""),
-)
-
-
-def _with_arguments(said: Any) -> Any:
-    """Return what the command says, plain data, with arguments in the place of options."""
-    if isinstance(said, dict):
-        return {key: _with_arguments(value) for key, value in said.items()}
-    if isinstance(said, list):
-        return [_with_arguments(value) for value in said]
-    for option, argument in _ARGUMENTS if isinstance(said, str) else ():
-        said = re.sub(option, argument, said)
-    return said
 
 
 @dataclass(frozen=True, repr=False)
@@ -248,13 +221,10 @@ def identify_trace(
         Setting(by, tuple(key.split(".")), value) for by, key, value in chosen if value is not None
     ]
     asked = Asked(Path("trace"), None, tuple(settings), "arguments", arrays=(*columns.values(),))
-    try:
-        recording, case = read_trace(asked)
-        diagnosis = identify(recording, case.judged_experiment)
-    except BiogripError as error:
-        raise BiogripError(_with_arguments(str(error))) from None
+    recording, case = read_trace(asked)
+    diagnosis = identify(recording, case.judged_experiment)
     data = data_of(diagnosis, case, asked.name, asked.given)
-    return TraceResult(diagnosis, _with_arguments(data), arguments)
+    return TraceResult(diagnosis, data, arguments)
 
 
 @one_blas_thread
@@ -282,7 +252,7 @@ def identify_together(
     results = {name: identify_trace(**{**shared, **own}) for name, own in given.items()}
     said = {name: (one.diagnosis, {**one.data, "trace": name}) for name, one in results.items()}
     sample, data = sample_of("sample", said)
-    return TraceResult(sample, _with_arguments(data), {"traces": given, **shared})
+    return TraceResult(sample, data, {"traces": given, **shared})
 
 
 def to_table(

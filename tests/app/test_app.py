@@ -29,8 +29,8 @@ from biogrip.app.choices import (
 from biogrip.app.server import _SHOWN, app_of
 from biogrip.app.window import Window
 from biogrip.cli import main
+from biogrip.files import read_table
 from biogrip.physics.models import CANDIDATES, MODELS
-from biogrip.records import read_table
 from biogrip.traces.tables import numbers_in, overview
 from tests.helpers.browser import Opened
 from tests.helpers.identified import write_trace
@@ -52,7 +52,7 @@ def served() -> Iterator[tuple[str, int]]:
         assert server.stdout
         place = server.stdout.readline().strip()
         assert re.fullmatch(r"http://127\.0\.0\.1:\d+/[\w-]{32}/", place)
-        kept = [*Path("/tmp").glob("biogrip_*")]
+        kept = [*Path("/tmp").glob("biogrip.*")]
         yield place, server.pid
         server.send_signal(signal.SIGINT)
         assert server.wait(20) == 0
@@ -315,6 +315,22 @@ def test_what_runs_ends_with_the_program() -> None:
         (command,) = " ".join((task / "children").read_text() for task in tasks).split()
         assert Path(f"/proc/{command}").exists()
     assert not Path(f"/proc/{command}").exists()
+
+
+@pytest.mark.nightly
+def test_what_a_killed_program_has_left_goes_with_the_next() -> None:
+    """But not what one that runs keeps."""
+    command = [sys.executable, "-m", "biogrip", "app", "--no-browser"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE) as killed:
+        assert killed.stdout
+        assert killed.stdout.readline()
+        (left,) = Path("/tmp").glob(f"biogrip.{killed.pid}.*")
+        with served():
+            assert left.exists()
+        killed.kill()
+    assert left.exists()
+    with served():
+        assert not left.exists()
 
 
 @pytest.mark.nightly

@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array, BoolArray, IntArray
-from biogrip.fit import least_squares, levenberg_marquardt
-from biogrip.fit.least_squares import FINE, PRIOR_WIDTH, ROUGH, LocalFits
-from biogrip.fit.levenberg_marquardt import Minima, Normal, minimize
+from biogrip.fit import least_squares
+from biogrip.fit.least_squares import FINE, PRIOR_WIDTH, ROUGH, LocalFits, Minima, Normal, minimize
 from biogrip.fit.problem import TraceProblem, silent
 from biogrip.judging.constrained_fits import ConstrainedFits
-from biogrip.judging.quantities import parameters_and_sum
+from biogrip.judging.likelihood import parameters_and_sum
 from biogrip.physics.models import MODELS, Sample
 from biogrip.physics.residuals import Residuals
 from biogrip.physics.sample_model import SampleModel, with_fixed
@@ -221,7 +220,7 @@ def test_last_bits_of_a_processor_change_no_digit(
     assert fitted() == here
 
 
-def test_four_rough_fits_are_continued() -> None:
+def test_four_rough_fits_are_continued(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of six basins that with the fourth best of the rough fits is the deepest."""
     fine = np.array([3.0, 3.0, 3.0, 1.0, 0.5, 3.0])
 
@@ -230,12 +229,15 @@ def test_four_rough_fits_are_continued() -> None:
         misfit = starts[:, 0] + 4 if tolerance == least_squares.ROUGH else fine[basins]
         return Minima(starts, misfit, np.ones_like(trace), np.ones(len(trace), dtype=bool))
 
-    fits: Any = seen(fitted=fitted)
+    fits: Any = seen(fitted=fitted, in_order=lambda minima: minima)
+    monkeypatch.setattr(least_squares, "LocalFits", lambda _: fits)
+    monkeypatch.setattr(least_squares, "alike", lambda _: [np.array([0])])
     starts = np.array([[5.0], [3.0], [1.0], [0.0], [4.0], [2.0]])
-    _, _, finished, trace = least_squares._finished(fits, [starts])
-    assert sorted(finished.x[:, 0]) == [0.0, 1.0, 2.0, 3.0]
-    assert finished.misfit.min() == 1.0
-    assert trace.tolist() == [0, 0, 0, 0]
+    before = starts[0], 9.0, 9.0, 0
+    (fit,) = least_squares.best_of_starts([seen()], [starts], [before], silent)
+    assert (fit.parameters, fit.misfit) == (np.exp(3.0), 1.0)
+    # A response and a derivative of each.
+    assert fit.evaluations == 2 * 6 + 2 * 4
 
 
 SLOPES = np.array([[3.0, 1.0], [1.0, 2.0], [0.0, 1.0]])
@@ -254,13 +256,13 @@ def linear(x: Array, _: IntArray) -> Normal:
 def test_of_linear_residuals_the_decrease_is_as_predicted(monkeypatch: pytest.MonkeyPatch) -> None:
     """But for the grid on which points lie, a thousandth of a standard deviation."""
     told: list[tuple[float, float]] = []
-    damp = levenberg_marquardt._damp
+    damp = least_squares._damp
 
     def damped(state: object, gained: Array, predicted: Array) -> None:
         told.append((gained[0], predicted[0]))
         damp(state, gained, predicted)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(levenberg_marquardt, "_damp", damped)
+    monkeypatch.setattr(least_squares, "_damp", damped)
     found = minimize(linear, *GIVEN)
     assert found.x[0] == pytest.approx([0.5, -0.25], abs=1e-3)
     assert told[0][0] == pytest.approx(told[0][1], rel=1e-2)

@@ -135,13 +135,13 @@ def test_the_sentence_is_that_of_the_numbers() -> None:
     ):
         misfits = [float(np.exp(-gain / (2 * READINGS))) for gain in gained.values()]
         tried = nested_fits.ranked(list(gained), misfits, READINGS)
-        assert said in nested_fits.advice(tried, "generalized_maxwell")
-        other = nested_fits.preferred(tried, "generalized_maxwell")
-        advice = nested_fits.advice(tried, "generalized_maxwell", spared=4)
+        models = nested_fits.FittedModels("generalized_maxwell", tried)
+        assert said in models.advice()
+        other, advice = models.preferred, replace(models, spared=("",) * 4).advice()
         assert (other is None) == ("none of the 2 models" in advice)
         assert (other is None) == ("better; 4 more could not, however well they fit" in advice)
         words = "None of the 2 models tried is adequate: the best of them, "
-        inadequate = nested_fits.advice(tried, "generalized_maxwell", adequate=False)
+        inadequate = replace(models, adequate=False).advice()
         assert inadequate.startswith(words) == (other is not None)
 
 
@@ -158,8 +158,9 @@ def test_branches_are_added_beside_a_power_law_that_is_not_adequate() -> None:
     misfits = {"generalized_maxwell": 29.0, "generalized_maxwell_2": 19.0}
     misfits |= {"generalized_maxwell_3": 11.0, "springpots_in_series": 5.2}
     tried = nested_fits.ranked([*misfits], [*misfits.values()], 110)
-    assert nested_fits.one_branch_more(tried) is None
-    assert nested_fits.one_branch_more(tried, adequate=False) == "generalized_maxwell_4"
+    models = nested_fits.FittedModels("generalized_maxwell", tried)
+    assert models.one_branch_more() is None
+    assert replace(models, adequate=False).one_branch_more() == "generalized_maxwell_4"
 
 
 def test_a_fit_ends_no_higher_than_with_another_seed() -> None:

@@ -12,10 +12,11 @@ from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import identify_from
 from biogrip.fit.problem import Fit, TraceProblem
 from biogrip.fit.trace_fit import TraceFit, _has_settled, gripper_functions
+from biogrip.fit.trace_noise import NoiseModel
 from biogrip.levels import OUTLYING
 from biogrip.physics.gripper import Gripper
-from biogrip.physics.noise import AR1, Drift, Noise, NoiseModel, Outliers, add_noise
-from biogrip.physics.simulation import simulated_response
+from biogrip.physics.noise import AR1, Drift, Noise, Outliers, add_noise
+from biogrip.physics.response import simulated_response
 from tests.helpers.default import STUDY
 
 CASE = STUDY.cases["liquid_drop_2"]

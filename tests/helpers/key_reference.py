@@ -1,8 +1,13 @@
 """Reference of all config keys in Markdown, and the JSON Schema of config files."""
 
+import ast
+import inspect
 import json
+import re
+import textwrap
 from collections.abc import Mapping
 from functools import cache
+from itertools import pairwise
 from typing import Any
 
 import pandas as pd
@@ -10,21 +15,75 @@ from pydantic import TypeAdapter
 
 from biogrip.config.loading import read_configs
 from biogrip.config.messages import Schema, bound, tidy
-from biogrip.keys import Block
+from biogrip.keys import Checked
 from biogrip_study.config.case_blocks import OVERRIDABLE
 from biogrip_study.config.study import DEFAULTS
-from biogrip_study.config.study_blocks import StudyConfig
+from biogrip_study.config.study_blocks import StudyConfig, ValueBlock
 
 _MOST_LISTED = 6
 _SIGNS = {"exclusiveMinimum": ">", "minimum": "≥", "maximum": "≤"}
+_UNITS = {
+    **{name: name for name in ("s", "m", "Hz", "rad", "deg", "V")},
+    "percent": "%",
+    **{"Nm": "N m", "Nms": "N m s", "kgm2": "kg m²"},
+    **{"Nms_per_rad": "N m s/rad", "Nm_per_rad": "N m/rad"},
+}
+_ENDS = re.compile(rf".*?_({'|'.join(_UNITS)})")
 _WORDS = {"string": "text", "object": "block"}
 
 
 @cache
 def documented() -> dict[str, Any]:
     """Return the JSON Schema of a config, with the docstrings of keys, which jobs do not read."""
-    Block.__pydantic_config__["use_attribute_docstrings"] = True
-    return tidy(TypeAdapter(StudyConfig).json_schema())
+    schema = tidy(TypeAdapter(StudyConfig).json_schema())
+    for kind in (*_kinds(Checked), ValueBlock):
+        node = schema if kind is StudyConfig else schema["$defs"].get(kind.__name__, {})
+        for key, said in _docstrings(kind).items():
+            inner = node.get("properties", {}).get(key)
+            if key == "__pydantic_extra__":
+                inner = node["additionalProperties"]
+            if inner is not None:
+                inner["description"] = said
+    return _shortened(schema)
+
+
+def _kinds(kind: Any) -> list[Any]:
+    kinds = [kind]
+    for subclass in kind.__subclasses__():
+        kinds += _kinds(subclass)
+    return kinds
+
+
+def _docstrings(kind: type) -> dict[str, str]:
+    """Return what stands below the fields of a class, and of those that it inherits from."""
+    found: dict[str, str] = {}
+    for base in kind.__mro__[::-1]:
+        # Those of methods are made without a source.
+        if base.__module__.startswith("biogrip") and base.__name__ != "_MethodBlocks":
+            (tree,) = ast.parse(textwrap.dedent(inspect.getsource(base))).body
+            pairs: Any = pairwise(tree.body)  # type: ignore[attr-defined]
+            for pair in pairs:
+                match pair:
+                    case ast.AnnAssign(target=ast.Name(name)), ast.Expr(ast.Constant(str(text))):
+                        found[name] = inspect.cleandoc(text)
+    return found
+
+
+def _shortened(node: Any, name: str = "") -> Any:
+    """Return a schema with units where names have one, and descriptions of one paragraph.
+
+    Its keys stand in alphabetic order.
+    """
+    if isinstance(node, list):
+        return [_shortened(item) for item in node]
+    if name == "description" and isinstance(node, str):
+        return node.partition("\n\n")[0].replace("\n", " ")
+    if not isinstance(node, Mapping):
+        return node
+    if name not in ("properties", "$defs"):
+        return {key: _shortened(node[key], key) for key in sorted(node)}
+    units = {key: {"unit": _UNITS[end[1]]} for key in node if (end := _ENDS.fullmatch(key))}
+    return {key: _shortened(node[key] | units.get(key, {}), key) for key in node}
 
 
 def leaves(block: Schema, path: str = "") -> dict[str, Schema]:

@@ -10,8 +10,7 @@ from scipy.optimize import least_squares
 
 from biogrip.arrays import Array
 from biogrip.fit.problem import TraceProblem
-from biogrip.judging.likelihood import Likelihood
-from biogrip.judging.quantities import Quantity
+from biogrip.judging.likelihood import Likelihood, Quantity
 
 _Rows = Callable[[Array], tuple[Array, Array]]
 STIFF = 1e5

@@ -12,7 +12,7 @@ from biogrip.judging.whiteness import is_still
 from biogrip.library import Sample, set_up
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.protocol import hold
-from biogrip.physics.simulation import simulated_response
+from biogrip.physics.response import simulated_response
 
 TIMES: Array = np.arange(300.0) * 0.2
 SINE: Array = 5 * np.sin(2 * np.pi * TIMES / 5)

@@ -94,8 +94,8 @@ def test_optimum_and_limits_are_those_of_joint_least_squares(
     for index, name in enumerate(NAMES):
         finding = sample.findings[index]
         assert finding.quantity.label == name
-        ends = [finding.profile.low, finding.profile.high]
-        assert finding.profile.best == pytest.approx(best[index], abs=1e-5)
+        ends = [finding.log_low, finding.log_high]
+        assert finding.log_best == pytest.approx(best[index], abs=1e-5)
         # The noise is known: the threshold is that of chi-squared.
         assert ends == pytest.approx(limits(rows, best, index, chi2.ppf(0.95, 1)), abs=1e-5)
 
@@ -127,7 +127,7 @@ def test_an_estimated_noise_counts_by_its_degrees_of_freedom() -> None:
     # Between that of the shortest trace and of all together.
     assert min(free) < together_free < sum(free)
     best = fitted(rows, np.log(TRUTH)).x
-    ends = [sample.findings[1].profile.low, sample.findings[1].profile.high]
+    ends = [sample.findings[1].log_low, sample.findings[1].log_high]
     assert ends == pytest.approx(limits(rows, best, 1, f.ppf(0.95, 1, together_free)), abs=1e-5)
 
 
@@ -161,7 +161,7 @@ def test_offset_and_start_are_each_traces_own(*, fit_start: bool) -> None:
     # A constant may be an offset as well as the spring's strain.
     assert (sample.findings[0].verdict == "determined") == fit_start
     for index in range(not fit_start, 3):
-        found = sample.findings[index].profile
+        found = sample.findings[index]
         assert found.low is not None
         assert found.high is not None
         if fit_start:
@@ -203,7 +203,7 @@ def test_relaxation_and_a_sweep_are_fitted_together() -> None:
 
     fit = fitted(left, truth)
     error = np.sqrt(np.diag(np.linalg.inv(fit.jac.T @ fit.jac)))
-    found = np.array([finding.profile.best for finding in sample.findings[:3]])
+    found = np.array([finding.log_best for finding in sample.findings[:3]])
     assert np.all(np.abs(found - fit.x) < 0.2 * error)
     np.testing.assert_allclose([it.deviation for it in sample.findings[:3]], error, rtol=0.05)
     assert sample.agreement.holds

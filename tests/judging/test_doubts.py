@@ -9,6 +9,7 @@ from scipy.signal import lfilter
 from scipy.stats import chi2
 
 from biogrip.command.words import in_words
+from biogrip.fit.trace_noise import NoiseModel
 from biogrip.judging.doubts import (
     DOUBT,
     DOUBTFUL,
@@ -23,7 +24,7 @@ from biogrip.judging.doubts import (
 from biogrip.judging.likelihood import Likelihood, make_likelihood
 from biogrip.library import identify_trace
 from biogrip.physics.instruments import INSTRUMENTS
-from biogrip.physics.noise import AR1, Noise, NoiseModel, Outliers, add_noise
+from biogrip.physics.noise import AR1, Noise, Outliers, add_noise
 from tests.helpers.default import seen
 from tests.helpers.identified import told
 from tests.helpers.places import ROOT
@@ -103,8 +104,8 @@ ZENER: dict[str, Any] = {"reads": "modulus", "model": "zener_maxwell"}
         (1e-4, DOUBT, "is 10000 times the noise that was given: its value or unit"),
         (0.85, HARMLESS, "is 1.18 times the noise that was given: limits are too narrow"),
         (1.5, "", ""),
-        (2.5, DOUBT, "The noise that was given is 2.5 times what the fit leaves"),
-        (1e5, DOUBT, "The noise that was given is 100000 times"),
+        (2.5, DOUBT, "is 0.4 times the noise that was given: its value or unit"),
+        (1e5, DOUBT, "is 1e-05 times the noise that was given"),
     ],
 )
 def test_a_stated_noise_that_the_fit_does_not_leave_is_told(

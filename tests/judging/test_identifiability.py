@@ -12,16 +12,18 @@ from biogrip.arrays import Array
 from biogrip.judging.diagnosis import Diagnosis, _pulling, _ringing, diagnose
 from biogrip.judging.likelihood import (
     Likelihood,
+    characteristic_times,
     check_rows,
     covariance,
+    find_combinations,
     least_sd,
     make_likelihood,
+    parameters_and_sum,
 )
-from biogrip.judging.quantities import characteristic_times, find_combinations, parameters_and_sum
-from biogrip.judging.verdicts import BOUNDED_ABOVE, DETERMINED, NOT_DETERMINED
+from biogrip.judging.profiles import BOUNDED_ABOVE, DETERMINED, NOT_DETERMINED
 from biogrip.physics.models import CANDIDATES, MODELS, Sample
+from biogrip.physics.response import Grip
 from biogrip.physics.sample_model import Network
-from biogrip.physics.simulation import Grip
 from tests.helpers.default import seen
 from tests.helpers.problems import (
     MODEL,

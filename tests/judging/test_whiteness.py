@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 from scipy.signal import lfilter
-from scipy.stats import beta, kstest
+from scipy.stats import beta
 from scipy.stats import f as fisher
 from scipy.stats import t as student
 
 from biogrip.arrays import Array
-from biogrip.fit.noise_model_fit import absorbed, outliers_of
+from biogrip.fit.trace_noise import absorbed, outliers_of
 from biogrip.judging import whiteness
 from biogrip.judging.doubts import DOUBTFUL
-from tests.fit.test_noise_model_fit import restricted
+from tests.fit.test_trace_noise import restricted
 from tests.helpers.identified import told
 
 LEVEL = 0.01
@@ -43,27 +43,6 @@ def test_chances_are_of_beta_distributions_with_moments_of_dense_matrices() -> N
         found.append((1 - ratio / mean, of_beta.cdf(ratio)))
     assert whiteness.correlated(residual, basis) == pytest.approx(found[0])
     assert whiteness.wandering(residual, basis) == pytest.approx(1 - found[1][1])
-
-
-def test_the_cumulative_periodogram_is_kolmogorovs() -> None:
-    """SciPy's test of the same shares, as if they were a sample of a uniform distribution."""
-    residual = np.random.default_rng(1).standard_normal(4000)
-    power = np.abs(np.fft.rfft(residual)[1:-1]) ** 2
-    expected = kstest(np.cumsum(power)[:-1] / power.sum(), "uniform", method="asymp").pvalue
-    # SciPy has steps of 1/1999 where there are steps of 1/2000.
-    assert whiteness.uneven(residual, NOTHING) == pytest.approx(expected, rel=0.05)
-    assert whiteness.uneven(np.ones(3), NOTHING[:, :3]) == 1.0
-    # A fit that absorbs the slowest quarter leaves the others as they are.
-    angles = 2 * np.pi * np.outer(np.arange(17), np.arange(128)) / 128
-    basis = absorbed(np.vstack((np.cos(angles), np.sin(angles[1:]))))
-    left = residual[:128] - residual[:128] @ basis.T @ basis
-    assert whiteness.uneven(left, basis) > 0.01
-    # Half the rate of the readings, at which noise has one degree of freedom, is left out.
-    noise, alternating = residual[:64], 100 * (-1.0) ** np.arange(64)
-    expected = whiteness.uneven(noise, NOTHING[:, :64])
-    assert whiteness.uneven(noise + alternating, NOTHING[:, :64]) == pytest.approx(
-        expected, rel=1e-9
-    )
 
 
 @pytest.mark.parametrize(("away", "doubted"), [(3.5, False), (8.0, True), (50.0, True)])

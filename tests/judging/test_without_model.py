@@ -11,7 +11,7 @@ from scipy.stats import chi2
 
 from biogrip.arrays import Array
 from biogrip.fit.any_sample import fit_any_sample
-from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
+from biogrip.judging.profiles import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
 from biogrip.judging.without_model import (
     _ADDED,
     LEVEL,

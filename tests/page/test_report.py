@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from biogrip.digits import legible
-from biogrip.records import read_table
+from biogrip.files import read_table
 from biogrip_study.config.study import load_given_study
 from biogrip_study.page import answers
 from biogrip_study.page.page import write_report

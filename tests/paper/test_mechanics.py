@@ -11,10 +11,10 @@ from scipy.stats import gaussian_kde
 
 from biogrip import library
 from biogrip.errors import BiogripError
+from biogrip.files import write_rows
 from biogrip.fit.problem import GeneRange
 from biogrip.physics.gripper import torque
 from biogrip.physics.models import MODELS, Sample
-from biogrip.records import write_rows
 from biogrip_study.config.case_blocks import Published
 from biogrip_study.config.study import Study
 from biogrip_study.records.identifications import (

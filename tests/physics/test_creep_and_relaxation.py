@@ -8,9 +8,8 @@ from biogrip.physics.fractional import LONGEST_S, SHORTEST_S, on_clock
 from biogrip.physics.gripper import NO_ARMS, Gripper
 from biogrip.physics.models import CANDIDATES, MODELS, as_richer, contained, different_in
 from biogrip.physics.protocol import Course, Phase, hold, join_phases, ramp
-from biogrip.physics.response import step_response, superpose
+from biogrip.physics.response import simulated_response, step_response, superpose
 from biogrip.physics.sample_model import Network, SampleModel, complex_modulus, with_fixed
-from biogrip.physics.simulation import simulated_response
 from tests.helpers.laplace import IMPEDANCES, Impedance, drawn, inverted
 
 DRIVEN = pytest.mark.parametrize("deforms", [False, True], ids=["creep", "relaxation"])

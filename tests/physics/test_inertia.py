@@ -16,9 +16,16 @@ from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.models import MODELS, generalized_maxwell
 from biogrip.physics.protocol import Course, hold, join_phases
-from biogrip.physics.response import LEFT, RIGHT, step_response, superpose
+from biogrip.physics.response import (
+    LEFT,
+    RIGHT,
+    elapsed_s,
+    ring,
+    ringing_s,
+    step_response,
+    superpose,
+)
 from biogrip.physics.sample_model import Network
-from biogrip.physics.simulation import elapsed_s, ring, ringing_s
 from tests.helpers.laplace import drawn, rotations, series
 from tests.helpers.problems import GRIPPER, MODEL, TORQUE
 from tests.physics.test_residuals import posed

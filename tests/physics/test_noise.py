@@ -6,16 +6,14 @@ import pytest
 from scipy.linalg import cholesky
 
 from biogrip.arrays import Array
+from biogrip.fit.trace_noise import WEIGHTED, NoiseModel, Whitening
 from biogrip.physics.noise import (
     AR1,
     KINDS,
-    WEIGHTED,
     Drift,
     Flicker,
     Noise,
-    NoiseModel,
     Outliers,
-    Whitening,
     add_noise,
     drift_is_flow,
     estimate_noise,

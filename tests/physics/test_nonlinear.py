@@ -13,8 +13,7 @@ from biogrip.errors import BiogripError
 from biogrip.physics.gripper import Arm, Gripper, rotation_of_tip
 from biogrip.physics.models import MODELS, generalized_maxwell
 from biogrip.physics.protocol import Course, Phase, evaluate, hold, join_phases
-from biogrip.physics.response import step_response, superpose
-from biogrip.physics.simulation import compute_grip
+from biogrip.physics.response import compute_grip, step_response, superpose
 from biogrip_study.gripper.nonlinear import correction, jaw_force, nonlinear_rotation
 from tests.helpers.responses import random_samples
 

@@ -15,6 +15,7 @@ from biogrip.physics.gripper import Gripper
 from biogrip.physics.gripper import torque as of_voltage
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.models import Sample, generalized_maxwell
+from biogrip.physics.modes import phi_functions
 from biogrip.physics.protocol import (
     SWEEP,
     Course,
@@ -26,7 +27,7 @@ from biogrip.physics.protocol import (
     ramp,
     sample_times,
 )
-from biogrip.physics.response import phi_functions, step_response, superpose
+from biogrip.physics.response import step_response, superpose
 from biogrip.physics.roots import SMALLEST_GAP, separate
 from biogrip_study.gripper.nonlinear import jaw_force
 from biogrip_study.methods.misfit import SeriesMisfit, series_of

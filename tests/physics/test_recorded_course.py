@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
+from biogrip.fit.trace_noise import NoiseModel, Whitening
 from biogrip.physics import modes
 from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import NO_ARMS
 from biogrip.physics.models import MODELS
-from biogrip.physics.modes import linear_responses
-from biogrip.physics.noise import NoiseModel, Whitening, nuisance_basis
+from biogrip.physics.noise import nuisance_basis
 from biogrip.physics.protocol import (
     Course,
     evaluate,
@@ -21,7 +21,7 @@ from biogrip.physics.protocol import (
     ramp,
     with_steps,
 )
-from biogrip.physics.simulation import simulated_response
+from biogrip.physics.response import linear_responses, simulated_response
 from tests.physics.test_residuals import assert_alike, posed
 
 RNG = np.random.default_rng(4)

@@ -13,13 +13,11 @@ from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import NO_ARMS, Gripper
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.models import MODELS, Sample
-from biogrip.physics.modes import linear_responses
 from biogrip.physics.noise import nuisance_basis, within, without
 from biogrip.physics.protocol import Course, Phase, hold, join_phases, sample_times
 from biogrip.physics.residuals import CondensedTrace, Residuals
-from biogrip.physics.response import step_response, superpose
+from biogrip.physics.response import linear_responses, simulated_response, step_response, superpose
 from biogrip.physics.sample_model import SampleModel, with_fixed
-from biogrip.physics.simulation import simulated_response
 from biogrip_study.methods.misfit import SeriesMisfit
 from tests.helpers.problems import condensed_of
 from tests.helpers.responses import PROTOCOLS, log_range, random_samples

@@ -11,8 +11,8 @@ import pytest
 
 from biogrip.command.outputs import COLUMNS, join_tables
 from biogrip.errors import BiogripError
+from biogrip.files import as_it_was, escape_formula, read_rows, write_rows
 from biogrip.physics.instruments import GRIPPER
-from biogrip.records import as_it_was, escape_formula, read_rows, write_rows
 from biogrip_study.records.rows import RowFile
 from biogrip_study.records.traces import (
     Measurements,

@@ -10,8 +10,8 @@ import pytest
 from scipy.stats import binomtest
 
 from biogrip.errors import BiogripError
+from biogrip.files import read_rows, write_object
 from biogrip.physics.response import step_response, superpose
-from biogrip.records import read_rows, write_object
 from biogrip_study.gripper.calibration import calibration_yaml
 from biogrip_study.records.identifications import INTERVALS
 from biogrip_study.stages import judgement as stage

@@ -4,13 +4,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from biogrip.judging.likelihood import bounds_percent, headlines
-from biogrip.records import write_rows
+from biogrip.files import write_rows
+from biogrip.judging.likelihood import bounds_percent
 from biogrip_study.records.identifications import identification_columns
 from biogrip_study.stages.targets import noise_of_readings
 from biogrip_study.tables import sweeps as stage
 from biogrip_study.tables.study import bounds_at_truth
-from biogrip_study.tables.sweeps import robustness
+from biogrip_study.tables.sweeps import headlines, robustness
 from tests.helpers.default import study_of
 from tests.helpers.problems import MODEL, rotation
 

@@ -20,7 +20,7 @@ ROWS = [f"{i / 2},{10 + i},{i % 3}" for i in range(12)]
 def read(path: Path, text: str | list[str], **keys: Any) -> Any:
     path.write_text(text if isinstance(text, str) else "\n".join(text), encoding="utf-8")
     quantity = keys.pop("quantity", "strain")
-    return read_recording(path, columns_of(**{"quantity": quantity, "by_options": True, **keys}))
+    return read_recording(path, columns_of(**{"quantity": quantity, **keys}))
 
 
 def said(path: Path, text: list[str], **keys: Any) -> str:

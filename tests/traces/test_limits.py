@@ -59,7 +59,7 @@ def test_the_documentation_says_the_limits() -> None:
         ("\x1b[31mred\n", r"'\x1b[31mred'"),
         ("20,2", "The last row has no line end"),
         ("aborted,by user\n", ", line 22, column 'time_s': found 'aborted'"),
-        ("20\n", ", line 22, column 'rotation_rad': found only 1 cell"),
+        ("20\n", ", line 22: found 1 cell in the row"),
         ("20,2e-6" + "\0" * 9, ", line 22, column 'rotation_rad': found '2e-6\0"),
     ],
 )

@@ -9,22 +9,21 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.command.hold import load_in_words
 from biogrip.command.options import Setting
 from biogrip.command.settings import Asked, case_of, read_trace
+from biogrip.command.words import load_in_words
 from biogrip.config.source import HOLD
 from biogrip.errors import BiogripError
 from biogrip.identify.data import trace_data
 from biogrip.identify.identify import identify
 from biogrip.identify.load_noise import smoothed
-from biogrip.identify.prepare import _noise, prepare
+from biogrip.identify.prepare import prepare
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.physics.instruments import CONTROLLED
 from biogrip.physics.protocol import evaluate
 from biogrip.traces.columns import held_unit
 from biogrip.traces.reader import read_recording
 from tests.helpers.columns import columns_of
-from tests.helpers.default import seen
 from tests.helpers.identified import write_trace
 
 EVEN = np.linspace(0.0, 90.0, 2001)
@@ -49,12 +48,6 @@ def test_what_was_held_may_have_its_unit() -> None:
         controlled = next(each for each in CONTROLLED if each.name == name)
         number, unit = held_unit(text, controlled)
         assert number * controlled.units[unit] == pytest.approx(expected, rel=1e-12)
-
-
-def test_the_noise_of_a_share_is_that_of_the_largest_reading() -> None:
-    trace, experiment = seen(sd=None, readings=np.array([3.0, -5.0])), seen(noise_share=0.02)
-    experiment.noise_sd = 0.24
-    assert _noise(trace, experiment) == pytest.approx(0.26)
 
 
 def test_readings_beside_the_record_of_the_load_are_gaps(tmp_path: Path) -> None:

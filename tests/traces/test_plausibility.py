@@ -9,7 +9,7 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.identify.plausibility import _responds, check_recording
+from biogrip.identify.prepare import _responds, check_recording
 from biogrip.library import Sample, set_up, simulate
 from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.models import MODELS
@@ -53,9 +53,10 @@ def said(
     units = time.removeprefix("time_"), reading.removeprefix("rotation_")
     lines, file = np.arange(len(time_s)) + 2, Path("trace.csv")
     recording = Recording(time_s, values, lines, file, columns, units)
-    problem = replace(set_up(gripper, phases, Sample("maxwell")), offset=offset)
+    problem = set_up(gripper, phases, Sample("maxwell"))
+    problem = replace(problem, offset=offset, noise_sd=noise_sd)
     try:
-        return check_recording(recording, problem, noise_sd) or ""
+        return check_recording(recording, problem) or ""
     except BiogripError as error:
         return str(error)
 
@@ -73,7 +74,7 @@ def test_the_papers_traces_pass_and_not_in_a_wrong_unit_or_mirrored(
     assert said(times, -noisy).startswith(
         f"trace.csv, lines 2 to {len(times) + 1}, column 'rotation_rad': {MIRRORED}, allowed is "
         "the closing rotation, positive where the arm closes. It would fit if it were -1 times "
-        "(then say scale: -1 under measurement)"
+        "(then say --set measurement.scale=-1)"
     )
     found = f"trace.csv, line {np.argmax(np.abs(noisy)) + 2}, column 'rotation_rad': found "
     for factor, allowed, fits in (
@@ -185,17 +186,14 @@ def test_what_rounding_leaves_of_a_torque_is_no_response(samples: int) -> None:
             assert MIRRORED in said(times, -values, phases=phases)
 
 
-@pytest.mark.parametrize(
-    ("by_options", "how"), [(True, "--start"), (False, "start_s under measurement")]
-)
-def test_times_outside_the_protocol_are_refused(by_options: bool, how: str) -> None:
+def test_times_outside_the_protocol_are_refused() -> None:
     values = trace(SAMPLES["liquid_drop_1"])
-    columns = columns_of(by_options=by_options)
+    columns = columns_of()
     for shift_s, found in ((-1.0, "line 2, column 'time_s': found -1 s"), (1.5, "line 401, ")):
         text = said(TIMES + shift_s, values, columns)
         assert text.startswith(f"trace.csv, {found}")
         assert "allowed is the protocol's time, 0 to 400 s. If the protocol starts" in text
-        assert f"not at 0 of the clock, {how} says when" in text
+        assert "not at 0 of the clock, --start says when" in text
     # Times are written with few digits.
     for times in (TIMES * (1 + 0.9e-5), TIMES - 1e-10):
         assert said(times, values) == ""

@@ -278,12 +278,13 @@ def test_endless_text_is_refused_in_few_words(tmp_path: Path, of: str) -> None:
 UNCLEAR = [(";", "5,845"), (";", "5.845"), ("\t", "5,845")]
 # Separator, time and reading of row i, and the numbers that they are; None is refused.
 MARKED = [
-    (";", "{i},5", "{i}.857.123,25", lambda i: (i + 0.5, 1e6 * i + 857123.25)),
-    ("\t", "{i}.0", "{i},857", lambda i: (i, 1000 * i + 857)),
-    (",", "{i}.0", '"{i},857"', lambda i: (i, 1000 * i + 857)),
-    (";", "{i}", "{i}.857.123", lambda i: (i, 1e6 * i + 857123)),
-    (";", "{i}", "{i}'857.5", lambda i: (i, 1000 * i + 857.5)),
-    (";", "{i}", "{i}\u00a0857,5", lambda i: (i, 1000 * i + 857.5)),
+    (";", "{i},5", "{i}.857.123,25", None),
+    (";", "{i},5", "{i}.857", None),
+    ("\t", "{i}.0", "{i},857", None),
+    (",", "{i}.0", '"{i},857"', None),
+    (";", "{i}", "{i}.857.123", None),
+    (";", "{i}", "{i}'857.5", None),
+    (";", "{i}", "{i}\u00a0857,5", None),
     (";", "0,{i}5", "{i},857", lambda i: (float(f"0.{i}5"), i + 0.857)),
     (";", "{i}.500", "{i},857", None),
     (";", "{i}.5", "{i},85", None),
@@ -305,10 +306,12 @@ def test_a_table_has_one_decimal_mark(
     path.write_text("\n".join([f"t_s{separator}G_Pa", *lines]), encoding="utf-8")
     columns = columns_of("t_s", "G_Pa", "modulus")
     if right is None:
-        found = reading.format(i=11), time.format(i=11)
-        assert "line 2, column 'G_Pa': found '{}' beside '{}'".format(*found) in refusal(
-            path, columns
+        said = refusal(path, columns)
+        assert (
+            "line 2, column 'G_Pa': found '{}', allow".format(reading.format(i=11).strip('"'))
+            in said
         )
+        assert f"a decimal {'comma' if ',5' in time else 'point'}" in said or time == "{i}"
         return
     recorded = read_recording(path, columns)
     np.testing.assert_allclose(recorded.time_s, [right(i)[0] for i in rows])

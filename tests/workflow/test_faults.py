@@ -71,26 +71,34 @@ def _killed_after(folder: Path, seconds: float, *command: str | Path) -> None:
 
 
 def _files(folder: Path) -> dict[str, bytes]:
-    """Return what is in a folder, but for what a kill has left of unfinished files."""
-    return {it.name: it.read_bytes() for it in folder.iterdir() if not it.name.endswith(".part")}
+    return {it.name: it.read_bytes() for it in folder.iterdir()}
+
+
+def _whole(files: dict[str, bytes]) -> dict[str, bytes]:
+    """Return files but for those that a kill has left unfinished."""
+    return {name: it for name, it in files.items() if not name.endswith(".part")}
 
 
 MOMENTS = 20
 
 
 @pytest.mark.parametrize("more", [(), ("--report", "page.html")])
+@pytest.mark.parametrize("samples", [False, True])
 def test_a_batch_killed_at_any_moment_ends_with_the_undisturbed_bytes(
-    tmp_path: Path, few: Path, more: tuple[str, ...]
+    tmp_path: Path, few: Path, more: tuple[str, ...], samples: bool
 ) -> None:
-    """And no trace that had its result loses it."""
+    """And no trace, or sample of several, that had its result loses it; nothing else is left."""
     files = [f"{number}.csv" for number in range(6)]
-    command: list[str | Path] = ["-m", "biogrip", "identify", *files, "--config", few]
+    asked = ["cells.tsv"] if samples else files
+    command: list[str | Path] = ["-m", "biogrip", "identify", *asked, "--config", few]
     command += ["--csv", "found.csv", *more]
 
     def folder_of(name: str) -> Path:
         (folder := tmp_path / name).mkdir()
+        rows = ["file\tsample", *(f"{file}\tcell {int(file[0]) // 2}" for file in files)]
+        (folder / "cells.tsv").write_text("\n".join(rows))
         for seed, file in enumerate(files):
-            write_drop(folder / file, seed)
+            write_drop(folder / file, seed // 2 if samples else seed)
         return folder
 
     undisturbed, began = folder_of("undisturbed"), time.monotonic()
@@ -99,8 +107,12 @@ def test_a_batch_killed_at_any_moment_ends_with_the_undisturbed_bytes(
     for moment in range(MOMENTS):
         folder = folder_of(str(moment))
         _killed_after(folder, lasts_s * moment / MOMENTS, *command)
-        assert _files(folder).items() <= _files(undisturbed).items()
+        left = _whole(_files(folder))
+        assert left.items() <= _files(undisturbed).items()
+        done = {file: (folder / file).stat().st_mtime_ns for file in left if "json" in file}
         ran(folder, sys.executable, *command)
+        # With a page, which has pictures, all traces are fitted again.
+        assert more or done == {file: (folder / file).stat().st_mtime_ns for file in done}
         assert _files(folder) == _files(undisturbed)
 
 
@@ -112,12 +124,15 @@ def test_a_study_killed_at_many_moments_ends_with_the_undisturbed_bytes(
     (tmp_path / "overlay.yaml").write_text(yaml.safe_dump(TINY))
     study: list[str | Path] = ["-m", "snakemake", "-j2", "-s", ROOT / "Snakefile"]
     study += ["--configfile", "overlay.yaml"]
+    theirs = results_of(tiny)
     for moment in range(MOMENTS):
         _killed_after(tmp_path, 4 + moment, *study)
+        # What has its name is whole.
+        left = _whole(results_of(tmp_path))
+        assert [name for name in left if left[name] != theirs[name]] == []
         ran(tmp_path, sys.executable, *study, "--unlock")
     ran(tmp_path, sys.executable, *study)
-    theirs = results_of(tiny)
-    ours = {name: it for name, it in results_of(tmp_path).items() if not name.endswith(".part")}
+    ours = results_of(tmp_path)
     assert ours.keys() == theirs.keys()
     assert [name for name in ours if ours[name] != theirs[name]] == []
 

@@ -22,7 +22,7 @@ from scipy.special import bdtr
 
 from biogrip.arrays import Array
 from biogrip.judging.likelihood import bounds_percent
-from biogrip.judging.verdicts import DETERMINED
+from biogrip.judging.profiles import DETERMINED
 from biogrip.levels import DETERMINED_PERCENT
 from biogrip.physics.gripper import ARM_KEYS, Gripper
 from biogrip.physics.noise import Noise, add_noise, stream

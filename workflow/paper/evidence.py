@@ -13,8 +13,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from biogrip.digits import counted
-from biogrip.judging.likelihood import bounds_percent
-from biogrip.judging.quantities import Quantity
+from biogrip.judging.likelihood import Quantity, bounds_percent
 from biogrip.levels import DETERMINED_PERCENT
 from biogrip.physics import gripper as actuator
 from biogrip.physics.protocol import sample_times

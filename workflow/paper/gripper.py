@@ -31,7 +31,7 @@ from biogrip.figures.style import (
 from biogrip.physics import gripper as actuator
 from biogrip.physics.gripper import LARGEST_M, SMALLEST_M, CombDrive, Gripper
 from biogrip.physics.protocol import evaluate, join_phases
-from biogrip.physics.simulation import simulated_response
+from biogrip.physics.response import simulated_response
 from biogrip_study.config.study import Study
 from biogrip_study.stages.job import job_study, logged, paths
 

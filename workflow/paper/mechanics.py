@@ -25,9 +25,15 @@ from biogrip.physics.gripper import (
 )
 from biogrip.physics.noise import add_noise, rms, stream
 from biogrip.physics.protocol import Course, largest_load
-from biogrip.physics.response import LEFT, RIGHT, step_response, superpose
+from biogrip.physics.response import (
+    LEFT,
+    RIGHT,
+    compute_grip,
+    simulated_response,
+    step_response,
+    superpose,
+)
 from biogrip.physics.sample_model import Network
-from biogrip.physics.simulation import compute_grip, simulated_response
 from biogrip_study.config.study import Case, Study
 from biogrip_study.gripper.nonlinear import jaw_force, nonlinear_rotation, target_grip
 from biogrip_study.gripper.unilateral import unilateral_response

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from biogrip.arrays import Array
 from biogrip.figures.style import BLACK, BLUE, ORANGE, PAGE_IN, SHADE, figure, panel, save, styled
 from biogrip.levels import DETERMINED_PERCENT
-from biogrip.physics.simulation import compute_grip
+from biogrip.physics.response import compute_grip
 from biogrip_study.config.study import Case, Study
 from biogrip_study.gripper.nonlinear import jaw_force
 from biogrip_study.records.identifications import read_batch, share_with_limits

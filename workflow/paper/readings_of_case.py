@@ -11,11 +11,11 @@ import numpy as np
 import biogrip_study.records.identifications as records
 from biogrip.arrays import Array
 from biogrip.config.source import overlaid
+from biogrip.files import write_rows
 from biogrip.fit.least_squares import fit_from
 from biogrip.fit.problem import Fit, TraceProblem
 from biogrip.keys import built
 from biogrip.physics.noise import add_noise, rms, stream
-from biogrip.records import write_rows
 from biogrip.terminal import Progress
 from biogrip_study.config.case_blocks import CaseBlock
 from biogrip_study.config.study import Case

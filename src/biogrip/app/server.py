@@ -4,6 +4,7 @@ Flask answers, behind Waitress, which listens on 127.0.0.1. Whoever does not kno
 address, comes by another name of the host, or from another page, is refused.
 """
 
+import os
 import secrets
 import signal
 import sys
@@ -11,11 +12,13 @@ import webbrowser
 from collections import defaultdict
 from io import BytesIO
 from pathlib import Path
-from tempfile import TemporaryDirectory, mkdtemp
+from shutil import rmtree
+from tempfile import TemporaryDirectory, gettempdir, mkdtemp
 
 from biogrip.app.choices import CHOICES, KNOWN, TICKED, remedies_by_column, with_option
 from biogrip.app.window import LARGEST_MB, LONGEST_S, Window
 from biogrip.errors import BiogripError
+from biogrip.files import left_in
 from biogrip.page.templates import environment
 from biogrip.physics.drawing import sketched
 from biogrip.physics.instruments import INSTRUMENTS
@@ -49,7 +52,9 @@ def open_app(port: int = 0, *, no_browser: bool = False) -> None:
         # So that what is temporary goes, too. Windows has no SIGHUP.
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), lambda *_: sys.exit())
-    with TemporaryDirectory(prefix="biogrip_") as folder:
+    for left in left_in(Path(gettempdir()), "biogrip.[0-9]*.*"):
+        rmtree(left, ignore_errors=True)
+    with TemporaryDirectory(prefix=f"biogrip.{os.getpid()}.") as folder:
         windows = defaultdict[str, Window](lambda: Window(Path(mkdtemp(dir=folder))))
         app = app_of(windows, token := secrets.token_urlsafe(24))
         server = waitress.create_server(app, host="127.0.0.1", port=port)

@@ -12,13 +12,11 @@ from collections import defaultdict
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
-from multiprocessing import get_all_start_methods, get_context
-from multiprocessing.connection import Connection, wait
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
 from biogrip import __version__
-from biogrip.command.hold import load_in_words
 from biogrip.command.options import Setting
 from biogrip.command.outputs import (
     WRITTEN_BY,
@@ -31,23 +29,20 @@ from biogrip.command.outputs import (
 )
 from biogrip.command.settings import Asked, check_settings, read_trace
 from biogrip.command.sheet import by_sample, is_table, read_table
-from biogrip.command.words import in_columns, in_words
+from biogrip.command.words import in_columns, in_words, load_in_words
 from biogrip.config.case import SampleCase
 from biogrip.config.loading import trace_defaults
 from biogrip.errors import BiogripError
-from biogrip.files import atomic_write, digest_of, software
+from biogrip.files import atomic_write, digest_of, software, write_rows
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.problem import SearchRange
 from biogrip.identify.data import trace_data
 from biogrip.identify.identify import STEPS, budget, identify_alike
-from biogrip.identify.other_fits import Trace
-from biogrip.identify.prepare import prepare
+from biogrip.identify.prepare import Trace, prepare
 from biogrip.identify.together import Together, identify_sample_of
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.keys import plain
-from biogrip.processes import end_with
-from biogrip.records import write_rows
-from biogrip.terminal import Progress, visible
+from biogrip.terminal import Progress, end_with, visible
 from biogrip.traces.columns import trace_file_problem
 from biogrip.traces.reader import form_in_words, is_usual
 
@@ -94,33 +89,25 @@ def identify_files(
     if rows is not None:
         # The last may be beyond the end.
         asked = asked[rows[0] : rows[1] + 1]
-    absent = {
-        own.name: f"{trace.place}: {problem}"
-        for own in asked
-        for trace in own.traces
-        if (problem := trace_file_problem(trace.trace))
-    }
-    every = [own for own in asked if own.name not in absent]
-    if alone and absent:
-        raise BiogripError(absent[asked[0].name])
     if output is not None and not alone:
         raise BiogripError("--output: only for one trace; each of several gets its own file.")
     if plot is not None and not (alone and plot.suffix == ".png"):
         text = f"found {visible(plot)}; allowed is a name that ends with .png, of one trace."
         raise BiogripError(f"--plot: {text} For several there is --report.")
+    for trace in asked[0].traces if alone else ():
+        trace.refuse_missing()
     # Errors of options and config concern all traces: they are raised once, here.
-    check_settings(every)
-    outputs = [output or own.output for own in every] if rows is None else []
-    names = [own.name for own in every]
+    check_settings(asked)
+    outputs = [output or sample.output for sample in asked] if rows is None else []
+    names = [sample.name for sample in asked]
     written = [*zip(names, outputs, strict=False), ("--report", report), ("--csv", table)]
-    read = [trace.trace for own in every for trace in own.traces]
+    read = [trace.trace for sample in asked for trace in sample.traces]
     check_outputs(written, [*files, *read, *filter(None, [config])])
-    drawn = bool(report or plot) and len(every) <= MOST_DRAWN
-    outcome = _identify_traces(every, outputs or None, drawn=drawn)
+    drawn = bool(report or plot) and len(asked) <= MOST_DRAWN
+    outcome = _identify_traces(asked, outputs or None, drawn=drawn)
     if alone and outcome.refused:
-        raise BiogripError(outcome.refused[asked[0].name])
-    copied = {own.name: own.copied for own in asked}
-    outcome = replace(outcome, refused=outcome.refused | absent, copied=copied)
+        raise BiogripError(outcome.refused[names[0]])
+    outcome = replace(outcome, copied={sample.name: sample.copied for sample in asked})
     if table is not None:
         write_rows(table, *table_of(outcome))
     if report is not None:
@@ -131,8 +118,8 @@ def identify_files(
         with atomic_write(plot) as scratch:
             scratch.write_bytes(b64decode(pictures[0].partition(",")[2]))
     print(in_words(outcome.found[0]) if alone else in_columns(outcome.found, outcome.refused))
-    pairs = zip(every, outputs, strict=False)
-    made = [path for own, path in pairs if own.name not in outcome.refused]
+    pairs = zip(names, outputs, strict=False)
+    made = [path for name, path in pairs if name not in outcome.refused]
     if said := [visible(path) for path in (*made, report, table, plot) if path]:
         print(f"Written to {', '.join(said)}.")
     return 1 if outcome.refused else 0
@@ -161,100 +148,68 @@ def _identify_traces(
     """
     if len(asked) <= 1 or outputs is None:
         return identify_batch(asked, outputs, drawn=drawn)
-    pairs = [*zip(asked, outputs, strict=True)]
-    found: dict[str, dict[str, Any]] = {}
-    for own, path in [] if drawn else pairs:
+    jobs = [*zip(asked, outputs, strict=True)]
+    known: dict[str, dict[str, Any]] = {}
+    for sample, path in [] if drawn else jobs:
         with suppress(BiogripError):
-            found[own.name] = read_result(path, _made_from(own))
-    if found:
-        text = f"{len(found)} of {len(asked)} traces are taken from their JSON files, as they and"
+            known[sample.name] = read_result(path, _made_from(sample))
+    if known:
+        text = f"{len(known)} of {len(asked)} traces are taken from their JSON files, as they and"
         print(f"{text} what is asked have not changed.", file=sys.stderr)
-    left = [number for number, own in enumerate(asked) if own.name not in found]
+    left = [job for job in jobs if job[0].name not in known]
     processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 2
     size = max(1, min(_MOST_IN_BATCH, -(-len(left) // processors)))
     batches = [left[start : start + size] for start in range(0, len(left), size)]
-    every = Outcome([], {})
-
-    def identify(batch: Sequence[int]) -> Outcome:
-        own, paths = zip(*(pairs[number] for number in batch), strict=True)
-        return identify_batch(own, paths, drawn=drawn)
-
-    def add(batch: Sequence[int], outcome: Outcome) -> None:
-        found.update({each["trace"]: as_written(each) for each in outcome.found})
-        every.refused.update(outcome.refused)
-        every.pictures.update(outcome.pictures)
-        for number in batch:
-            print(f"{number + 1} of {len(asked)}: {visible(asked[number].name)}", file=sys.stderr)
-
-    for batch, outcome in zip(batches, side_by_side(identify, batches, processors), strict=True):
-        if outcome is not None:
-            add(batch, outcome)
-            continue
-        # One of its traces may have asked for more memory than there is.
-        print(f"biogrip: {_KILLED}; its traces are identified one by one.", file=sys.stderr)
-        singles = [[number] for number in batch]
-        for single, alone in zip(singles, side_by_side(identify, singles, 1), strict=True):
-            trace = asked[single[0]].name
-            text = f"{visible(trace)}: {_KILLED}, twice; the same command tries it again."
-            add(single, alone or Outcome([], {trace: text}))
-    every.found.extend(found[own.name] for own in asked if own.name in found)
+    work = partial(_identify_jobs, drawn=drawn)
+    every, count = Outcome([], {}), len(known)
+    for batch, outcome in zip(batches, side_by_side(work, batches, processors), strict=True):
+        pieces = [(batch, outcome)]
+        if outcome is None:
+            # One of its traces may have asked for more memory than there is.
+            print(f"biogrip: {_KILLED}; its traces are identified one by one.", file=sys.stderr)
+            pieces = [([job], next(side_by_side(work, [[job]], 1))) for job in batch]
+        for piece, told in pieces:
+            name = piece[0][0].name
+            text = f"{visible(name)}: {_KILLED}, twice; the same command tries it again."
+            told = told or Outcome([], {name: text})
+            known.update({result["trace"]: as_written(result) for result in told.found})
+            every.refused.update(told.refused)
+            every.pictures.update(told.pictures)
+            for sample, _ in piece:
+                count += 1
+                print(f"{count} of {len(asked)}: {visible(sample.name)}", file=sys.stderr)
+    every.found.extend(known[sample.name] for sample in asked if sample.name in known)
     return every
 
 
-def side_by_side(work: Callable[[J], T], jobs: Sequence[J], most: int) -> Iterator[T | None]:
-    """Yield what work gives of each job, in their order; None if its process was killed.
+def _identify_jobs(jobs: Sequence[tuple[Asked, Path]], *, drawn: bool) -> Outcome:
+    asked, outputs = zip(*jobs, strict=True)
+    return identify_batch(asked, outputs, drawn=drawn)
 
-    Each job has a process of its own, so that a kill costs no other its result. At most some are
-    there at once; they are forked, and end when this one does, however that ends. An error that
-    work raises is raised here.
+
+def side_by_side(work: Callable[[J], T], jobs: Sequence[J], most: int) -> Iterator[T | None]:
+    """Yield what work gives of each job, in their order; None from where a process was killed on.
+
+    At most some are done at once, in processes that are forked, and end when this one does, however
+    that ends. An error that work raises is raised here.
     """
+    # Imported here: one trace has no use for them.
+    from concurrent.futures import ProcessPoolExecutor
+    from concurrent.futures.process import BrokenProcessPool
+    from multiprocessing import get_all_start_methods, get_context
+
     if "fork" not in get_all_start_methods():  # on Windows
         yield from map(work, jobs)
         return
-    fork, parent = get_context("fork"), os.getpid()
-    running: dict[Any, tuple[int, Any]] = {}
-    done: dict[int, T | None] = {}
-    started = given = 0
-
-    def send(ours: Connection, theirs: Connection, job: J) -> None:
-        """Send what work gives, and the error that it raises, of which one is None."""
-        end_with(parent)
-        # If the parent ends before, nobody reads what is sent.
-        ours.close()
+    with ProcessPoolExecutor(most, get_context("fork"), end_with, (os.getpid(),)) as pool:
         try:
-            found: tuple[T | None, Exception | None] = work(job), None
-        except Exception as error:
-            found = None, error
-        with suppress(OSError):
-            theirs.send(found)
-
-    try:
-        while given < len(jobs):
-            while started < len(jobs) and len(running) < most:
-                ours, theirs = fork.Pipe(duplex=False)
-                process = fork.Process(target=send, args=(ours, theirs, jobs[started]))
-                process.start()
-                # What nobody can write to any more has an end.
-                theirs.close()
-                running[ours] = started, process
-                started += 1
-            ready: list[Any] = wait([*running])
-            for one in ready:
-                number, process = running.pop(one)
+            for future in [pool.submit(work, job) for job in jobs]:
                 try:
-                    done[number], error = one.recv()
-                except (EOFError, OSError):
-                    done[number], error = None, None
-                process.join()
-                if error is not None:
-                    raise error
-            while given in done:
-                yield done.pop(given)
-                given += 1
-    finally:
-        for ours, (_, process) in running.items():
-            ours.close()
-            process.join()
+                    yield future.result()
+                except BrokenProcessPool:
+                    yield None
+        finally:
+            pool.shutdown(cancel_futures=True)
 
 
 def _made_from(asked: Asked) -> str:

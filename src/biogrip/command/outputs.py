@@ -13,10 +13,9 @@ from biogrip import __version__
 from biogrip.command.words import set_up_in_words
 from biogrip.digits import rounded_numbers, with_unit
 from biogrip.errors import BiogripError
-from biogrip.files import scratch_path, write_text
+from biogrip.files import AGAIN, read_object, scratch_path, whole, write_object, write_text
 from biogrip.judging.without_model import EXPONENT, LEVEL
 from biogrip.physics.instruments import INSTRUMENTS, ROTATION, Channel
-from biogrip.records import AGAIN, read_object, whole, write_object
 from biogrip.terminal import visible, visible_lines
 
 WRITTEN_BY = "written_by_biogrip"
@@ -73,10 +72,8 @@ def check_outputs(outputs: Iterable[tuple[str, Path | None]], inputs: Iterable[P
             continue
         place = os.path.join(os.path.realpath(output.parent), output.name)
         if place in first:
-            text = (
-                f"would be written for '{visible(first[place])}' and for '{visible(written_for)}'"
-            )
-            raise BiogripError(f"{visible(output)}: {text}; allowed is a file for each.")
+            text = f"'{visible(first[place])}' and for '{visible(written_for)}'; allowed is a file"
+            raise BiogripError(f"{visible(output)}: would be written for {text} for each.")
         first[place] = written_for
         if os.path.realpath(output) in read:
             raise BiogripError(f"{visible(output)}: is read; allowed is another file to write.")
@@ -222,8 +219,13 @@ def join_tables(parts: list[Path], table: Path, rows: int) -> None:
         frames.append(frame := pd.read_csv(rows_of, dtype=str, keep_default_na=False))
         first, end = map(int, part.stem.split("-"))
         wanted = min(end + 1, rows) - first
-        if len(frame) != wanted or not {*last} <= {*frame}:
+        if len(frame) != wanted or not {"samples", *last} <= {*frame}:
             text = f"found {len(frame)} traces, wanted {wanted} with {', '.join(last)}"
             raise BiogripError(f"{part}: {text}. {AGAIN}")
+    # Of a batch that no trace was read in alone, two columns are in no unit of the others.
+    at = [*frames[0].columns].index("samples") + 1
+    told = [frame.columns[at : at + 2] for frame in frames if (frame.iloc[:, at + 1] != "").any()]
+    for frame in frames if told else []:
+        frame.columns = [*frame.columns[:at], *told[0], *frame.columns[at + 2 :]]
     every = pd.concat(frames)
     write_text(table, every[[*every.columns.drop(last), *last]].to_csv(index=False))

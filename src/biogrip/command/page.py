@@ -17,9 +17,10 @@ from biogrip import __version__
 from biogrip.command import words
 from biogrip.command.outputs import FAILED, WRITTEN_BY, Outcome
 from biogrip.command.words import (
+    alike,
+    notes_of,
     outcome_in_words,
     paragraph,
-    preferred_in_words,
     set_up_in_words,
     together,
 )
@@ -38,7 +39,7 @@ from biogrip.page.templates import data_url, environment
 from biogrip.physics.drawing import sketched
 from biogrip.physics.models import Sample
 from biogrip.physics.protocol import evaluate, hold, join_phases, largest_load
-from biogrip.physics.simulation import simulated_response
+from biogrip.physics.response import simulated_response
 from biogrip.terminal import visible_lines
 
 _STATUS_MARKS = {OK: "✓", DOUBTFUL: "!", REJECTED: "✕"}
@@ -202,14 +203,17 @@ def write_page(outcome: Outcome, page: Path) -> None:
         with style.styled():
             drawn, groups = draw_every_trace(outcome, columns)
             figure_of_all = address(drawn)
-    outcomes = [(data["trace"], data["fit"], " ".join(data["reasons"])) for data in traces]
-    outcomes += [(trace, FAILED, reason) for trace, reason in outcome.refused.items()]
-    further = outcome_in_words(outcomes) if several else preferred_in_words(traces[0])
+    outcomes = [(data["trace"], data["fit"]) for data in traces]
+    outcomes += [(trace, FAILED) for trace in outcome.refused]
+    further = outcome_in_words(outcomes) if several else []
     set_up = together(map(set_up_in_words, traces))
     singles = [single for data in traces for single in data.get("traces", [data])]
     assumed: dict[str, dict[str, Any]] = {single["trace"]: single["assumed"] for single in singles}
     shared = common([*assumed.values()])
-    beyond_shared = {trace: _as_yaml(beyond(block, shared)) for trace, block in assumed.items()}
+    beyond_shared = {
+        trace: _as_yaml({key: it for key, it in block.items() if key not in shared})
+        for trace, block in assumed.items()
+    }
     text = (
         environment()
         .get_template("traces.html.j2")
@@ -220,6 +224,7 @@ def write_page(outcome: Outcome, page: Path) -> None:
             figure_of_all=figure_of_all,
             groups=groups,
             set_up=set_up,
+            notes=alike((data["trace"], note) for data in traces for note in notes_of(data)),
             methods=paragraph([*set_up, *further]),
             several=several,
             columns=columns,
@@ -241,26 +246,9 @@ def write_page(outcome: Outcome, page: Path) -> None:
 
 
 def common(several: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return what all of several nested blocks say alike."""
-    alike = {}
-    for key in several[0] if several else ():
-        every: list[Any] = [block.get(key) for block in several]
-        if all(value == every[0] for value in every):
-            alike[key] = every[0]
-        elif all(isinstance(value, dict) for value in every) and (inner := common(every)):
-            alike[key] = inner
-    return alike
-
-
-def beyond(one: Mapping[str, Any], shared: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what one of nested blocks says beyond what all share."""
-    more = {}
-    for key, value in one.items():
-        if key not in shared:
-            more[key] = value
-        elif value != shared[key]:
-            more[key] = beyond(value, shared[key])
-    return more
+    """Return the keys that all of several blocks have alike."""
+    first = several[0] if several else {}
+    return {key: it for key, it in first.items() if all(block.get(key) == it for block in several)}
 
 
 def _as_yaml(block: Mapping[str, Any]) -> str:

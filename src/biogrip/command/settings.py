@@ -23,8 +23,8 @@ from urllib.parse import quote
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.command.hold import remarks_on_hold
 from biogrip.command.options import Setting
+from biogrip.command.words import remarks_on_hold
 from biogrip.config.case import SampleCase
 from biogrip.config.experiment_blocks import LARGEST_PARAMETER, LONGEST_S, SHORTEST_S
 from biogrip.config.loading import load, read_config_of, read_configs, trace_defaults
@@ -44,8 +44,8 @@ from biogrip.physics.instruments import (
 )
 from biogrip.physics.models import ALIASES, CANDIDATES
 from biogrip.physics.shapes import KNOWN_SHAPES
-from biogrip.traces.columns import held_unit, place
-from biogrip.traces.measurement_block import ARRAYS, READINGS, ByOptions, MeasurementBlock
+from biogrip.traces.columns import held_unit, place, trace_file_problem
+from biogrip.traces.measurement_block import ARRAYS, READINGS, MeasurementBlock
 from biogrip.traces.reader import Recording, read_recording, recording_of_arrays
 
 MODEL = "generalized_maxwell"
@@ -133,6 +133,11 @@ class Asked:
         renamed = {counts_as.get(key, key): value for key, value in measured.items()}
         return {**blocks, "measurement": renamed} if counts_as else blocks
 
+    def refuse_missing(self) -> None:
+        """Raise a `BiogripError` if there is no such file."""
+        if not self.arrays and (problem := trace_file_problem(self.trace)):
+            raise BiogripError(f"{self.place}: {problem}")
+
     def read(self, columns: MeasurementBlock) -> Recording:
         """Read the trace; a `BiogripError` has file, line and column, or array and index."""
         if self.arrays:
@@ -181,8 +186,9 @@ def read_trace(asked: Asked) -> tuple[Recording, SampleCase]:
 
     A `BiogripError` has file, line and column, or setting, that cannot be used.
     """
+    asked.refuse_missing()
     case, recording = case_of(asked)
-    columns = ByOptions(**vars(case.block.measurement))
+    columns = case.block.measurement
     # What its protocol follows from was read before the protocol's start was known.
     recording = replace(recording, read=columns) if recording else asked.read(columns)
     said = (*recording.remarks_before, *remarks_on_hold(recording, case, asked.given))
@@ -382,6 +388,7 @@ def check_settings(traces: Sequence[Asked]) -> None:
     problems.
     """
     every = [trace for own in traces for trace in own.traces]
+    every = [trace for trace in every if not trace_file_problem(trace.trace)]
     for config in dict.fromkeys(file for asked in every for file in asked.configs):
         for note in read_config_of(TraceConfig, [config])[1]:
             print(note, file=sys.stderr)

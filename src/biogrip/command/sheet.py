@@ -16,7 +16,7 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
-from biogrip.command.options import OPTIONS, REPLACED, Setting
+from biogrip.command.options import OPTIONS, Setting, setting_of
 from biogrip.command.outputs import COLUMNS
 from biogrip.command.settings import Asked, measured_keys, refuse_all
 from biogrip.config.source import value_of
@@ -102,9 +102,10 @@ def read_table(
             f"{place(path, 1)}: found no column '{_FILES[0]}' among {listed(header)}; allowed is "
             f"one.{nearest(_FILES[0], header)}"
         )
-    options_of = {name: _plain(name) for name in header if _plain(name) in OPTIONS}
+    as_options = {name: _plain(name).replace("_", "-") for name in header}
+    options_of = {name: option for name, option in as_options.items() if option in OPTIONS}
     problems = list(_column_problems(path, header, rows, {file, *options_of}))
-    used = {"", *options_of, *(name for name in header if "." in name)}
+    used = {*options_of, *(name for name in header if "." in name)}
     kept = [(line, row) for line, row in rows if any(row)]
     found: list[Asked] = []
     set_by: list[dict[str, str]] = []
@@ -113,16 +114,21 @@ def read_table(
             text = f"found {counted(len(row), 'cell')} in the row, allowed are the header's"
             problems.append(f"{place(path, line)}: {text} {len(header)}.")
         by_name = dict(zip_longest(header, row[: len(header)], fillvalue=""))
+        by_name.pop("", None)
         trace = path.parent / by_name.pop(file)
         if trace == path.parent:
             problems.append(f"{place(path, line, file)}: found nothing, allowed is a trace.")
         settings = list(options)
         set_by.append({name: cell for name, cell in by_name.items() if name in used})
         for name, cell in set_by[-1].items():
-            where = place(path, line, name)
+            where, option = place(path, line, name), options_of.get(name)
             try:
-                settings += _settings_of(cell, name, options_of.get(name), where)
-            except (BiogripError, ValueError) as error:
+                if cell and not option:
+                    settings.append(Setting(where, tuple(name.split(".")), value_of(cell, name)))
+                elif cell and option:
+                    of_each = cell.split() if option == "fix" else [cell]
+                    settings += [setting_of(option, part, where) for part in of_each]
+            except BiogripError as error:
                 problems.append(f"{where}: {error}")
         copied = {name: cell for name, cell in by_name.items() if name not in used}
         found.append(Asked(trace, config, tuple(settings), place(path, line), copied))
@@ -172,18 +178,6 @@ def _parts(traces: Sequence[Path], set_by: Sequence[Mapping[str, str]]) -> list[
     ]
 
 
-def _settings_of(cell: str, name: str, option: str | None, by: str) -> Iterator[Setting]:
-    """Yield what a cell sets, in a column named after an option, or after a key with dots."""
-    if not (name and cell):
-        return
-    key = name if option is None else OPTIONS[option]
-    if isinstance(key, str):
-        yield Setting(by, tuple(key.split(".")), value_of(cell, name))
-        return
-    for part in cell.split() if option == "fix" else [cell]:
-        yield Setting(by, *key(part))
-
-
 def _rows(path: Path) -> list[tuple[int, list[str]]]:
     """Return the cells of every row with its line, the header's first."""
     if problem := trace_file_problem(path):
@@ -215,8 +209,6 @@ def _column_problems(
         where = place(path, 1, name)
         if name and name in header[:number]:
             yield f"{where}: stands twice; allowed is each name once."
-        elif new := REPLACED.get(_plain(name)):
-            yield f"{where}: is now the column '{new}', with cells as in 'sphere 2.5 um'."
         elif name not in used and (name in COLUMNS or _OF_RESULTS.fullmatch(name)):
             yield f"{where}: is a column of the results; allowed is another name."
         elif name and cells and "." not in name and name not in used:

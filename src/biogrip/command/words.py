@@ -1,23 +1,29 @@
 """Results of identification in words: for a terminal, and what a paper says of the methods."""
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from math import log
 from textwrap import indent
 from typing import Any
 
+import numpy as np
+
 import biogrip.levels as levels
 from biogrip import __version__
-from biogrip.digits import counted, instant, legible, plain, with_limits, with_unit, within_limits
+from biogrip.config.case import SampleCase
+from biogrip.config.source import HOLD, RAMP
+from biogrip.digits import counted, instant, legible, plain, with_limits, with_unit
+from biogrip.identify.prepare import Trace
 from biogrip.judging.doubts import DOUBT, DOUBTFUL, HARMLESS, OK, REJECTED, REJECTION
-from biogrip.judging.verdicts import FIT_REJECTED, NOT_DETERMINED
+from biogrip.judging.profiles import FIT_REJECTED, NOT_DETERMINED
 from biogrip.judging.what_moves import LEAST_MOVE, error_in_words
 from biogrip.judging.without_model import BEYOND, EXPONENT, FLOW, LEVEL, LOSS
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.models import CANDIDATES
 from biogrip.terminal import aligned, visible, visible_lines
-from biogrip.traces.columns import shape_and_sizes
+from biogrip.traces.columns import held_unit, shape_and_sizes
 from biogrip.traces.measurement_block import KNOWN_NOISE
+from biogrip.traces.reader import Recording
 
 # Instrument whose readings span decades: their misfit is told over their noise.
 _SWEEPS = "oscillation"
@@ -26,6 +32,8 @@ _LINES = 5
 # Most names of traces that are refused for what another one is.
 _MOST_NAMED = 5
 _LIKELIHOOD_RATIO = "That they are of one sample was tested by two likelihood ratios (Bonferroni)."
+# Share of the largest load so far below which a contact shrinks, not only scatters.
+_STAYS = 0.9
 _NUMBER = re.compile(r"\d[\d.e+-]*")
 MEANS = {
     OK: "the residuals look like noise",
@@ -54,7 +62,7 @@ def in_words(found: Mapping[str, Any]) -> str:
     lines += [found["limits"]] if not rejected else []
     lines += moves_in_words(found)
     lines += [trade["words"] for trade in found["trades"]]
-    lines += fitted_in_words(found)
+    lines += [*given_in_words(found), *fitted_in_words(found)]
     lines += [f"Note: {visible(text)}" for text in further_notes(found)]
     lines += [found["advice"]] if found["advice"] else []
     lines += [taken_for_granted(found)] if found["by_default"] else []
@@ -72,7 +80,7 @@ def agreement_in_words(found: Mapping[str, Any]) -> list[str]:
 
 def terms_of(found: Mapping[str, Any]) -> list[str]:
     """Return lines on the noise of a trace, and on what of its instrument was fitted along."""
-    return [misfit_in_words(found), *fitted_in_words(found)[len(given_in_words(found)) :]]
+    return [misfit_in_words(found), *fitted_in_words(found)]
 
 
 def without_model_in_words(found: Mapping[str, Any]) -> list[str]:
@@ -178,8 +186,8 @@ def in_unit(value: float, found: Mapping[str, Any]) -> str:
 
 
 def fitted_in_words(found: Mapping[str, Any]) -> list[str]:
-    """Return lines on what is given, and on onset, offset and drift as far as fitted."""
-    lines = given_in_words(found)
+    """Return lines on onset, contact, offset and drift as far as fitted."""
+    lines = []
     if "onset_s" in found:
         when = instant(found["onset_s"], *found["onset_limits_s"])
         lines.append(f"The protocol starts at {when} of the clock, as fitted.")
@@ -199,7 +207,9 @@ def given_in_words(found: Mapping[str, Any]) -> list[str]:
     """Return lines on what was held or loaded, a shape, and fixed parameters, as far as given."""
     lines = [visible(found["load"])] if "load" in found else []
     if shape := found["assumed"]["measurement"].get("shape"):
-        lines.append(f"Moduli, and G, K and J, are Young's, by the shape: {visible(shape)}.")
+        source = shape_and_sizes(shape)[0].source
+        text = f"Moduli, and G, K and J, are Young's, by the shape: {visible(shape)} ({source})."
+        lines.append(text)
     return [*lines, f"Fixed: {', '.join(found['fixed'])}."] if "fixed" in found else lines
 
 
@@ -223,32 +233,6 @@ def one_sided_in_words(
     return [f"One-sided limits hold with {50 * (1 + found[0]['confidence']):g} % confidence."]
 
 
-def for_a_paper(found: Mapping[str, Any]) -> list[str]:
-    """Return sentences for a paper: one per quantity with a limit.
-
-    Each has its condition, if any. Nothing if the fit is doubtful or rejected.
-    """
-    if found["fit"] != OK:
-        return []
-    sentences, traces = [], len(found.get("traces", [found]))
-    count = f"n = {counted(traces, 'trace')}{' of one sample' * (traces > 1)}"
-    for each in found["quantities"]:
-        low, high, confidence = each["low"], each["high"], 100 * found["confidence"]
-        if low is None and high is None:
-            continue
-        if low is None or high is None:
-            sign, kind, confidence = "<>"[high is None], "one-sided limit", 50 + confidence / 2
-            numbers = [plain(high if low is None else low, 2)]
-        else:
-            sign, kind = "=", "profile-likelihood interval"
-            numbers = within_limits(each["value"], low, high)
-        provided = f", provided {each['provided']}" if each["provided"] else ""
-        value, reach = f"{numbers[0]} {each['unit']}".rstrip(), " to ".join(numbers[1:])
-        within = f"{confidence:g} % {f'{kind} {reach}'.rstrip()}, {count}{provided}"
-        sentences.append(f"{each['quantity']} {sign} {value} ({within})")
-    return sentences
-
-
 def further_notes(found: Mapping[str, Any]) -> list[str]:
     """Return the texts of the notes that are no reasons for the fit's status."""
     return [note["text"] for note in found["notes"] if note["text"] not in found["reasons"]]
@@ -262,42 +246,42 @@ def in_columns(found: Sequence[Mapping[str, Any]], refused: Mapping[str, str]) -
         rows = []
         for each in found:
             cells = {q["quantity"]: limits_in_short(q) for q in each["quantities"]}
-            own = (cells.get(label, "") for label in columns)
-            rows.append([visible(each["trace"]), each["fit"], *own])
+            told = (cells.get(label, "") for label in columns)
+            rows.append([visible(each["trace"]), each["fit"], *told])
         lines.append(aligned(rows, ["trace", "fit", *columns.values()]))
         lines.append(f"{100 * found[0]['confidence']:g} % limits; ? where the trace tells nothing.")
         fits = {each["fit"] for each in found}
         lines += [f"Fit {fit}: {means}." for fit, means in MEANS.items() if fit in fits]
-        lines += _once(found, agreement_in_words)
-        lines += [*one_sided_in_words(found), *_once(found, lambda each: [each["limits"]])]
-        lines += _once(found, _provided)
-        lines += _once(found, given_in_words)
-        for text, traces in notes_alike(found):
-            of = visible(traces[0])
-            of += f" and {len(traces) - 1} more alike" if traces[1:] else ""
-            lines.append(f"{of}: {visible(text)}")
-        lines += _once(found, lambda it: [taken_for_granted(it)] if it["by_default"] else [])
+        lines += one_sided_in_words(found)
+        said = [(each["trace"], text) for each in found for text in _said_of(each)]
+        for text, traces in alike(said):
+            of_all = {(each["trace"], text) for each in found} <= {*said}
+            of = "" if of_all else f"{visible(few(traces, 1))}: "
+            lines.append(f"{of}{visible(text)}")
     if refused:
         lines.append(f"Not identified, {len(refused)} of {len(refused) + len(found)}:")
-        for text, traces in _alike([*refused.items()]):
-            dots = ["..."] * (len(traces) > _MOST_NAMED + 1)
-            more = ", ".join([*traces[1 : _MOST_NAMED + 1], *dots])
-            like = f" The like holds for {len(traces) - 1} more: {visible(more)}."
+        for text, traces in alike([*refused.items()]):
+            like = f" The like holds for {len(traces) - 1} more: {visible(few(traces[1:]))}."
             lines.append(indent(visible_lines(text) + like * (len(traces) > 1), "  "))
     return "\n".join(lines)
 
 
-def notes_alike(found: Sequence[Mapping[str, Any]]) -> list[tuple[str, list[str]]]:
-    """Return notes with the traces that have them, those that are alike once."""
-    said = []
-    for each in found:
-        texts = [f"{_SAID[note['weight']]}: {note['text']}" for note in each["notes"]]
-        texts += [each["advice"]] if each["fit"] == REJECTED and each["advice"] else []
-        said += [(each["trace"], text) for text in texts]
-    return _alike(said)
+def _said_of(found: Mapping[str, Any]) -> list[str]:
+    """Return what is said of one trace of several, below their table."""
+    provided = {q["provided"]: None for q in found["quantities"] if q["provided"]}
+    lines = [*agreement_in_words(found), found["limits"]]
+    lines += [f"Sums hold provided {condition}." for condition in provided]
+    lines += [*given_in_words(found), *notes_of(found)]
+    return [*lines, taken_for_granted(found)] if found["by_default"] else lines
 
 
-def _alike(said: Sequence[tuple[str, str]]) -> list[tuple[str, list[str]]]:
+def notes_of(found: Mapping[str, Any]) -> list[str]:
+    """Return notes of a trace with their weight, and advice where its model is rejected."""
+    notes = [f"{_SAID[note['weight']]}: {note['text']}" for note in found["notes"]]
+    return [*notes, found["advice"]] if found["fit"] == REJECTED and found["advice"] else notes
+
+
+def alike(said: Iterable[tuple[str, str]]) -> list[tuple[str, list[str]]]:
     """Return texts on traces with their names, the first of those that are alike.
 
     They are alike if, names and numbers apart, they are the same up to their third colon.
@@ -310,22 +294,10 @@ def _alike(said: Sequence[tuple[str, str]]) -> list[tuple[str, list[str]]]:
     return [*found.values()]
 
 
-def _once(
-    found: Sequence[Mapping[str, Any]], words_of: Callable[[Mapping[str, Any]], list[str]]
-) -> list[str]:
-    """Return what is said of every trace, or, where that differs, of each with its name."""
-    said = [words_of(each) for each in found]
-    if all(words == said[0] for words in said):
-        return said[0]
-    return [
-        f"{visible(each['trace'])}: {line}"
-        for each, words in zip(found, said, strict=True)
-        for line in words
-    ]
-
-
-def _provided(found: Mapping[str, Any]) -> list[str]:
-    return [f"Sums hold provided {q['provided']}." for q in found["quantities"] if q["provided"]]
+def few(names: Sequence[str], most: int = _MOST_NAMED) -> str:
+    """Return the first names, and how many more there are."""
+    more = f" and {len(names) - most} more" if names[most:] else ""
+    return f"{', '.join(names[:most])}{more}"
 
 
 def columns_of(found: Iterable[Mapping[str, Any]]) -> dict[str, str]:
@@ -355,6 +327,75 @@ def limits_in_short(quantity: Mapping[str, Any]) -> str:
     if low is not None:
         return f"≥ {plain(low, 2)}"
     return "?" if high is None else f"≤ {plain(high, 2)}"
+
+
+def load_in_words(trace: Trace, case: SampleCase, given: Mapping[str, Any]) -> str:
+    """Return what was held or loaded; nothing where a config has the protocol.
+
+    Given are the blocks of the config that the user has set.
+    """
+    (recording, experiment), measured = trace, case.block.measurement
+    controlled, start_s = measured.instrument.controlled, measured.start_s or 0.0
+    if recording.load is not None and experiment.record is not None:
+        column, loads = recording.form["columns"]["load"], experiment.record[:, 1]
+        if case.instrument.relative:
+            loads = loads * getattr(case.block.protocol.phases[0], controlled.column)
+        ends = loads.min(), loads.max()
+        low, high = (plain(controlled.in_unit(end, column["unit"])) for end in ends)
+        what = high if low == high else f"{low} to {high}"
+        what += f" {column['unit']}" * (column["unit"] != "1")
+        count = np.count_nonzero(recording.load[:, 0] >= start_s)
+        rows = f"column {column['column']}, {count:,} rows"
+        return f"Load: {what} from {start_s:g} s ({rows})."
+    if HOLD[0] not in given:
+        return ""
+    number, unit = held_unit(given[HOLD[0]], controlled)
+    start = "its start, as fitted," if experiment.fit_start else f"{start_s:g} s"
+    held = f"{number:g} {unit}".removesuffix(" 1")
+    what = f"{held} from {start} to {recording.form['last_s']:g} s"
+    rise = f", reached within {given[RAMP[0]]:g} s" if RAMP[0] in given else ""
+    return f"Held: {what}{rise}."
+
+
+def _shrinks(recording: Recording, case: SampleCase) -> tuple[str, ...]:
+    """Return a sentence if a tip was drawn back, where its contact has no such sum."""
+    instrument = case.block.measurement.instrument
+    if recording.load is None or instrument.read.power == instrument.controlled.power == 1:
+        return ()
+    time_s, loads = recording.load[recording.load[:, 0] <= recording.form["last_s"]].T
+    most = np.maximum.accumulate(loads)
+    falls = np.flatnonzero((most > 0.1 * most[-1]) & (loads < _STAYS * most))
+    if not len(falls):
+        return ()
+    return (
+        f"The contact shrinks from {time_s[falls[0]]:g} s on: what is said holds while it grows or "
+        f"stays. Leave these readings out: --until {time_s[falls[0] - 1]:g}.",
+    )
+
+
+def remarks_on_hold(
+    recording: Recording, case: SampleCase, given: Mapping[str, Any]
+) -> tuple[str, ...]:
+    """Return a sentence if a tip was drawn back, or what was held may be in another unit.
+
+    That is if readings have a unit with a prefix, and what was held is a number.
+    """
+    if shrinks := _shrinks(recording, case):
+        return shrinks
+    read, controlled = case.instrument.read, case.instrument.controlled
+    unit, held = recording.units[1], given.get(HOLD[0])
+    prefix = unit.removesuffix(read.unit)
+    if held is None or not (prefix and read.unit and controlled.unit) or prefix == unit:
+        return ()
+    number, taken = held_unit(held, controlled)
+    if taken != controlled.unit or str(held).rstrip().endswith(taken):
+        return ()
+    likely = prefix + controlled.unit
+    likely = likely if likely in controlled.units else controlled.unit
+    return (
+        f"The {read.name} is in {unit}, but what was held, {number:g}, is taken to be in {taken}: "
+        f'say its unit, as in --hold "{number:g} {likely}".',
+    )
 
 
 REFERENCE = (
@@ -394,20 +435,9 @@ def set_up_in_words(found: Mapping[str, Any]) -> list[str]:
     said.append(f"The model ({title}{fixed}) was fitted by least squares{also}; {_noise(found)}.")
     level = f"{100 * found['confidence']:g} %"
     said.append(f"Intervals are {level} profile-likelihood limits. {found['limits']}")
-    if any((each["low"] is None) != (each["high"] is None) for each in found["quantities"]):
-        sided = f"{50 * (1 + found['confidence']):g} %"
-        said.append(f"Where one limit alone is given, it holds with {sided} confidence, one-sided.")
+    said += one_sided_in_words([found])
     conditions = ((q["quantity"], q["provided"]) for q in found["quantities"] if q["provided"])
     return [*said, *(f"The value of {name} holds provided {it}." for name, it in conditions)]
-
-
-def preferred_in_words(found: Mapping[str, Any]) -> list[str]:
-    """Return a sentence on the model that is preferred to that of the fit, if one is."""
-    if not found["preferred_model"]:
-        return []
-    lowest = min(found["models"], key=lambda row: row["delta_bic"])
-    count = len(found["models"])
-    return [f"Of {count} models that were fitted, another has the lowest BIC: {lowest['title']}."]
 
 
 def _protocol(found: Mapping[str, Any]) -> str:
@@ -439,26 +469,18 @@ def _noise(found: Mapping[str, Any]) -> str:
     return "the noise was taken from the scatter of neighbouring readings"
 
 
-def outcome_in_words(traces: Iterable[tuple[str, str, str]]) -> list[str]:
-    """Return sentences on what was refused and why, from name, status and reason of traces."""
+def outcome_in_words(traces: Iterable[tuple[str, str]]) -> list[str]:
+    """Return sentences on what was used and what was refused, from name and fit of traces."""
     every = [*traces]
-    counts = {fit: sum(own == fit for _, own, _ in every) for fit in (OK, DOUBTFUL)}
-    kept = f"{counts[OK] + counts[DOUBTFUL]} of {counted(len(every), 'trace')} were used"
-    doubtful = f", {counts[DOUBTFUL]} of them with a doubtful fit" if counts[DOUBTFUL] else ""
-    said = [f"{kept}{doubtful}."]
-    for rejected, what in ((True, "Rejected"), (False, "Not identified")):
-        left = [own for own in every if own[1] not in counts and (own[1] == REJECTED) == rejected]
-        named = [f"{visible(own[0])}: {_first_of(*own)}" for own in left[:_MOST_REFUSED]]
-        more = f"; {len(left) - len(named)} more" if left[len(named) :] else ""
-        said += [f"{what}: {len(left)} ({'; '.join(named)}{more})."] if left else []
+    names = {fit: [name for name, status in every if status == fit] for fit in MEANS}
+    failed = [name for name, status in every if status not in MEANS]
+    doubtful = len(names[DOUBTFUL])
+    kept = f"{len(names[OK]) + doubtful} of {counted(len(every), 'trace')} were used"
+    said = [f"{kept}{f', {doubtful} of them with a doubtful fit' * bool(doubtful)}."]
+    for what, left in (("Rejected", names[REJECTED]), ("Not identified", failed)):
+        if left:
+            said.append(f"{what}: {len(left)} ({visible(few(left, _MOST_REFUSED))}).")
     return said
-
-
-def _first_of(name: str, _: str, reason: str) -> str:
-    """Return the first clause of a reason, without the place in the file at its beginning."""
-    if reason.startswith(name):
-        reason = reason.partition(": ")[2]
-    return re.split(r"[;.](?=\s|$)|: |, as ", reason)[0].strip() or "no reason given"
 
 
 def together(several: Iterable[Sequence[str]]) -> list[str]:

@@ -9,6 +9,8 @@ from pydantic import Field
 from biogrip.config.trace_blocks import CaseName, CommonBlocks, ExperimentBlocks, SampleBlocks
 from biogrip.keys import Block, Complaint, Distinct, below, unknown_names
 
+MOST_CASES = 2000
+
 SHARED = tuple(block.name for block in fields(ExperimentBlocks))
 """Blocks that may be given for all samples, and in a case for it alone."""
 
@@ -30,13 +32,14 @@ class DesignBlock(Block):
 
 
 @dataclass(frozen=True, kw_only=True)
-class DesignConfig(CommonBlocks, ExperimentBlocks):
-    """Samples, what is known of their experiment, and the limits of the design."""
+class CasesBlocks(CommonBlocks):
+    """Samples, and the limits of a design for them."""
 
-    cases: Annotated[Mapping[CaseName, SampleBlocks], Field(min_length=1, max_length=100)]
+    cases: Annotated[Mapping[CaseName, SampleBlocks], Field(min_length=1, max_length=MOST_CASES)]
     """Samples by name."""
-    only: Distinct[Annotated[tuple[str, ...], Field(max_length=100)]] = ()
-    """Names of the samples to design for. By default all."""
+    only: Distinct[Annotated[tuple[str, ...], Field(max_length=MOST_CASES)]] = ()
+    """Names of the cases to run or design for; the others are left out. By default all under
+    `cases`."""
     design: DesignBlock = field(default_factory=DesignBlock)
 
     def complaints(self) -> Iterator[Complaint]:
@@ -47,3 +50,8 @@ class DesignConfig(CommonBlocks, ExperimentBlocks):
         yield from unknown_names(("only",), self.only, self.cases)
         asked = self.design.parameters
         yield from unknown_names(("design", "parameters"), asked, dict.fromkeys(searched))
+
+
+@dataclass(frozen=True, kw_only=True)
+class DesignConfig(CasesBlocks, ExperimentBlocks):
+    """Samples, what is known of their experiment, and the limits of the design."""

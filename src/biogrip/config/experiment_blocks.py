@@ -44,6 +44,7 @@ USUAL_NAMES = BeforeValidator(
 )
 """Annotation of a model's name, which may be a usual one, as SLS."""
 
+_SAID_NEAREST = Field(json_schema_extra={"usual": [*ALIASES, "jeffreys"]})
 # A load or a deformation, either way.
 _SMALLEST = 1e-50
 _Signed = Annotated[float | None, Field(ge=-1e12, le=1e12)]
@@ -221,43 +222,15 @@ class SampleBlock(Checked, BaseModel):
     """Constitutive model of the sample and its true parameters."""
 
     model_config = OPEN
-    __pydantic_extra__: dict[
-        str,
-        Annotated[
-            float,
-            Field(
-                le=LARGEST_PARAMETER,
-                description="True values of the model's parameters, by name, SI units.",
-            ),
-        ],
-    ] = Field(init=False)
-
-    model: Annotated[
-        str,
-        OneOf(MODELS),
-        USUAL_NAMES,
-        Field(
-            description='Constitutive model, see "Sample models" for its parameters.',
-            json_schema_extra={"usual": [*ALIASES, "jeffreys"]},
-        ),
-    ]
-    branches: Annotated[
-        int,
-        Field(
-            ge=1,
-            le=MOST_BRANCHES,
-            description="Number of Maxwell branches of `generalized_maxwell`; with more than one, "
-            "its parameters are k_1, k_2, ..., k_p, c_1, c_2, ..., c_p. By default 1.",
-        ),
-    ] = 1
-    size_m: Annotated[
-        float | None,
-        Field(
-            ge=SMALLEST_M,
-            le=LARGEST_M,
-            description="Diameter of the sample. It decides at which angle the jaws touch it.",
-        ),
-    ] = None
+    __pydantic_extra__: dict[str, Annotated[float, Field(le=LARGEST_PARAMETER)]] = Field(init=False)
+    """True values of the model's parameters, by name, SI units."""
+    model: Annotated[str, OneOf(MODELS), USUAL_NAMES, _SAID_NEAREST]
+    """Constitutive model, see "Sample models" for its parameters."""
+    branches: Annotated[int, Field(ge=1, le=MOST_BRANCHES)] = 1
+    """Number of Maxwell branches of `generalized_maxwell`; with more than one, its parameters are
+    k_1, k_2, ..., k_p, c_1, c_2, ..., c_p. By default 1."""
+    size_m: Annotated[float | None, Field(ge=SMALLEST_M, le=LARGEST_M)] = None
+    """Diameter of the sample. It decides at which angle the jaws touch it."""
 
     @property
     def parameters(self) -> dict[str, float]:

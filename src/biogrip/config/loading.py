@@ -76,24 +76,18 @@ def refuse(
 def read_config_of(kind: Any, files: Sequence[Path]) -> tuple[dict[str, Any], list[str]]:
     """Read config files, and return the keys that a kind of block has, and a note on each other.
 
-    These may be of a study; one that is nearly a key of the block is a `BiogripError`.
+    These may be of a study; one that is nearly a key of the block stays, to be refused.
     """
-    config, sources = read_configs(files), [*map(read_source, files)]
+    config, sources, notes = read_configs(files), [*map(read_source, files)], list[str]()
     kinds: dict[tuple[str, ...], Any] = {(): kind, ("identifiability",): IntervalBlock}
-    complaints, notes = list[Complaint](), list[str]()
     for above, block_kind in kinds.items():
         block: Any = config.get(above[0]) if above else config
         known = [field.name for field in fields(block_kind)]
         for name in [*block] if isinstance(block, dict) else ():
-            path = (*above, name)
-            near = get_close_matches(name, known, n=1, cutoff=_MISSPELT)
-            if name not in known and near:
-                text = f"unknown key. Did you mean '{near[0]}'? Allowed here: {', '.join(known)}."
-                complaints.append((path, text))
-            elif name not in known:
+            if not get_close_matches(name, known, n=1, cutoff=_MISSPELT):
+                path = (*above, name)
                 notes.append(f"{place(path, sources)}: {dotted(path)}: is not used here.")
                 del block[name]
-    refuse(complaints, sources)
     return config, notes
 
 

@@ -25,18 +25,11 @@ T = TypeVar("T")
 MISSING = "is missing and has no default."
 
 # Choices without a nearest one: a unit of almost the same name is a thousand times another.
-_UNITS_OF_FILES = ([*TIME_UNITS], [*ROTATION.units])
+_WITHOUT_NEAREST = ([*TIME_UNITS], [*ROTATION.units])
 _BOUNDS = {"exclusiveMinimum": "greater than", "minimum": "at least", "maximum": "at most"}
 # Most errors that are explained, and most characters of a value that are shown.
 _MOST, _LONGEST = 1000, 40
 
-_UNITS = {
-    **{name: name for name in ("s", "m", "Hz", "rad", "deg", "V")},
-    "percent": "%",
-    **{"Nm": "N m", "Nms": "N m s", "kgm2": "kg m²"},
-    **{"Nms_per_rad": "N m s/rad", "Nm_per_rad": "N m/rad"},
-}
-_ENDS = re.compile(rf".*?_({'|'.join(_UNITS)})")
 _WORDS = {"integer": "an integer", "boolean": "true or false", "string": "text", "array": "a list"}
 _NUMBER = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?")
 _SWITCHES = {"true": True, "false": False}
@@ -77,15 +70,12 @@ def _explained(schema: "Schema", error: ErrorDetails) -> Complaint:
             leaf = chosen
         else:
             path, above, leaf = (*path, part), leaf, leaf.inside(part)
-    of_name = error["loc"][-1] == "[key]"
-    text = _text(path, leaf, above, error, of_name=of_name)
     # An unknown key of a mapping is reported for the block that contains it.
-    return path[:-1] if of_name and error["type"] == "literal_error" else path, text
+    of_block = error["loc"][-1] == "[key]" and error["type"] == "literal_error"
+    return path[:-1] if of_block else path, _text(path, leaf, above, error)
 
 
-def _text(
-    path: Sequence[Hashable], leaf: "Schema", above: "Schema", error: ErrorDetails, *, of_name: bool
-) -> str:
+def _text(path: Sequence[Hashable], leaf: "Schema", above: "Schema", error: ErrorDetails) -> str:
     """Say what was found, and what is allowed; `above` is the schema of the block with the key."""
     found = error["input"]
     match error["type"]:
@@ -99,11 +89,8 @@ def _text(
             if usual := leaf.get("usual"):
                 near = nearest_three(found, [*choices, *usual])
                 return f"found {_shown(found)}. Did you mean {near}? All: biogrip identify -h."
-            hint = "" if choices in _UNITS_OF_FILES else nearest(found, choices)
+            hint = "" if choices in _WITHOUT_NEAREST else nearest(found, choices)
             return f"found {_shown(found)}.{hint} Allowed: {', '.join(choices)}."
-        case "string_pattern_mismatch" if of_name:
-            kind = str(path[-2]).removesuffix("s")
-            return f"not a usable {kind} name: {leaf.get('form')} (it names files)."
         case "string_pattern_mismatch":
             return f"found {_shown(found)}, allowed is {leaf.get('form')}."
         case _ if error["type"] == TWICE:
@@ -120,8 +107,7 @@ def _text(
             return f"found {_shown(found)}, allowed is a finite number."
         case "greater_than" | "greater_than_equal" | "less_than_equal":
             limits = [f"{_BOUNDS[it]} {bound(leaf.node[it])}" for it in _BOUNDS if it in leaf.node]
-            text = f"{' and '.join(limits)} {leaf.get('unit', '')}".rstrip()
-            return f"found {_shown(found)}, allowed is {text}."
+            return f"found {_shown(found)}, allowed is {' and '.join(limits)}."
     comma = isinstance(found, str) and _NUMBER.fullmatch(found.strip().replace(",", ".", 1))
     return f"found {_shown(found)}{' (a decimal comma?)' * bool(comma)}, allowed is {leaf.word}."
 
@@ -223,18 +209,13 @@ def schema_of(kind: Any) -> Schema:
     return Schema(found["items"], found["$defs"])
 
 
-def tidy(node: Any, name: str = "") -> Any:
-    """Return a JSON Schema without null as an alternative, and with a unit where a name has one."""
+def tidy(node: Any) -> Any:
+    """Return a JSON Schema without null as an alternative."""
     if isinstance(node, list):
         return [tidy(item) for item in node if item != {"type": "null"}]
-    if name == "description" and isinstance(node, str):
-        return node.partition("\n\n")[0].replace("\n", " ")
     if not isinstance(node, Mapping):
         return node
-    said = {key: tidy(inner, key) for key, inner in node.items()}
-    if name == "properties":
-        units = {key: {"unit": _UNITS[it[1]]} for key in said if (it := _ENDS.fullmatch(key))}
-        return {key: units.get(key, {}) | inner for key, inner in said.items()}
+    said = {key: tidy(inner) for key, inner in node.items()}
     if len(said.get("anyOf", ())) == 1:
         said |= said.pop("anyOf")[0] | said
     return said

@@ -92,47 +92,14 @@ def dotted(path: KeyPath) -> str:
     return text or "the file"
 
 
-def scalar_problem(node: yaml.ScalarNode) -> str | None:
-    """Return what is wrong with a value that YAML 1.1 reads unexpectedly (dates, base 60)."""
-    kind, text = node.tag.rpartition(":")[2], node.value
-    if kind in ("int", "float") and ":" in text:
-        reading = "in base 60; allowed is a number without colons"
-    elif kind == "int" and _OCTAL.fullmatch(text):
-        reading = "in base 8; allowed is a number that does not begin with 0"
-    elif kind == "timestamp":
-        reading = "as a date; allowed is a number"
-    else:
-        return None
-    return f"found {text}, which YAML reads {reading}, or text in quotes."
-
-
-def _refuse_deep(text: str, loader: Any) -> None:
-    """Refuse blocks in blocks, by a `ValueError`, before those that read a tree end by them."""
-    depth = 0
-    for event in yaml.parse(text, loader):
-        depth += isinstance(event, yaml.CollectionStartEvent)
-        depth -= isinstance(event, yaml.CollectionEndEvent)
-        if depth > _DEEPEST:
-            raise ValueError(f"found more than {_DEEPEST} levels, allowed are fewer")
-
-
 def value_of(text: str, key: str = "") -> Any:
     """Read the value of a key as YAML, units as text; refuse what is not read as it looks."""
     if key.endswith("_unit"):
         return text
     try:
-        _refuse_deep(text, yaml.SafeLoader)
-        node = yaml.compose(text, yaml.SafeLoader)
-        problem = scalar_problem(node) if isinstance(node, yaml.ScalarNode) else None
-        if any(isinstance(token, yaml.AliasToken) for token in yaml.scan(text)):
-            # One of itself has no end.
-            raise ValueError("found an alias, allowed is the value itself")
-        value = yaml.safe_load(text)
+        return deepcopy(_parsed(text)[1])
     except (yaml.YAMLError, ValueError) as error:
-        problem = f"not valid YAML: {' '.join(str(error).split())}."
-    if problem:
-        raise BiogripError(problem)
-    return value
+        raise BiogripError(_line_and_problem(error)[1]) from error
 
 
 def _read(file: Path) -> tuple[Lines, dict[str, Any]]:
@@ -148,64 +115,89 @@ def _read(file: Path) -> tuple[Lines, dict[str, Any]]:
         text = f"cannot be read: {error.strerror}{'' if file.exists() else where}."
         raise BiogripError(f"{shown_path(file)}: {text}") from error
     if len(content) > LARGEST_BYTES:
-        raise _wrong(file, None, f"found more than {LARGEST_BYTES} bytes; allowed are fewer.")
+        text = f"found more than {LARGEST_BYTES} bytes; allowed are fewer."
+        raise BiogripError(f"{shown_path(file)}: {text}")
     try:
-        return _parsed(file, content.decode("utf-8"))
-    except UnicodeDecodeError as error:
-        found = f"found the byte 0x{content[error.start]:02x}, allowed is text in UTF-8."
-        raise _wrong(file, content.count(b"\n", 0, error.start) + 1, found) from error
+        lines, config = _parsed(content.decode("utf-8"))
     except (yaml.YAMLError, ValueError) as error:
-        mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
-        said = getattr(error, "problem", None) or " ".join(str(error).split())
-        raise _wrong(file, mark and mark.line + 1, f"not valid YAML: {said}.") from error
+        line, problem = _line_and_problem(error)
+        place = f", line {line}" if line else ""
+        raise BiogripError(f"{shown_path(file)}{place}: {problem}") from error
+    if not isinstance(config or {}, dict):
+        raise BiogripError(f"{shown_path(file)}: found no keys, allowed is a config.")
+    return lines, config or {}
+
+
+def _line_and_problem(error: Exception) -> tuple[int | None, str]:
+    """Return where YAML cannot be used, and why."""
+    if isinstance(error, UnicodeDecodeError):
+        found, line = error.object[error.start], error.object.count(b"\n", 0, error.start) + 1
+        return line, f"found the byte 0x{found:02x}, allowed is text in UTF-8."
+    mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
+    problem = getattr(error, "problem", None) or " ".join(str(error).split())
+    return mark and mark.line + 1, f"not usable YAML: {problem.removesuffix('.')}."
 
 
 # The defaults are read again for every trace.
 @lru_cache(maxsize=16)
-def _parsed(file: Path, text: str) -> tuple[Lines, dict[str, Any]]:
-    _refuse_deep(text, _Loader)
+def _parsed(text: str) -> tuple[Lines, Any]:
+    """Return the lines of keys and items of YAML, and its content."""
+    depth = 0
+    # Before those that read a tree end by it.
+    for event in yaml.parse(text, _Loader):
+        depth += isinstance(event, yaml.CollectionStartEvent)
+        depth -= isinstance(event, yaml.CollectionEndEvent)
+        _refuse_many(event, depth, 0)
     root = yaml.compose(text, Loader=_Loader)
     lines: dict[KeyPath, int] = {}
     if root is None:
-        return lines, {}
-    if not isinstance(root, yaml.MappingNode):
-        raise _wrong(file, 1, "found no keys, allowed is a config.")
-    _walk(file, root, (), lines)
-    content = yaml.SafeLoader("").construct_document(root)
-    # It may come by a merge.
-    if "__use_yte__" in content:
-        text = "with __use_yte__ a config is a program. `snakemake --configfile` runs it before it "
-        text += "reads any rule: there it has run by now. `biogrip` has not run it. Allowed is a "
-        raise _wrong(file, lines.get(("__use_yte__",), 1), f"{text}config without it.")
-    return lines, content
+        return lines, None
+    _walk(root, (), lines)
+    return lines, yaml.SafeLoader("").construct_document(root)
 
 
-def _walk(file: Path, node: yaml.Node, path: KeyPath, lines: dict[KeyPath, int]) -> None:
-    """Collect the lines of keys and items, and refuse what stands twice or would be misread."""
-    line = node.start_mark.line + 1
-    if len(path) > _DEEPEST or len(lines) > _MOST_KEYS:
+def _refuse(at: Any, path: KeyPath, problem: str) -> None:
+    """Refuse a node, or what begins one, by a `yaml.YAMLError` with its line and key."""
+    key = f"{dotted(path)}: " if path else ""
+    raise yaml.MarkedYAMLError(problem=f"{key}{problem}", problem_mark=at.start_mark)
+
+
+def _refuse_many(at: Any, levels: int, keys: int) -> None:
+    if levels > _DEEPEST or keys > _MOST_KEYS:
         text = f"found more than {_DEEPEST} levels or {_MOST_KEYS} values, those of an alias"
-        raise _wrong(file, line, f"{text} counted wherever it is used; allowed are fewer.")
-    if isinstance(node, yaml.ScalarNode) and (problem := scalar_problem(node)):
-        raise _wrong(file, line, f"{dotted(path)}: {problem}")
-    if isinstance(node, yaml.MappingNode):
-        for key, value in node.value:
-            named = isinstance(key, yaml.ScalarNode)
-            inner, at = (*path, key.value if named else "?"), key.start_mark.line + 1
-            if not key.tag.endswith((":str", ":merge")):
-                text = "is no text: YAML reads on, off, yes, no and numbers otherwise; put it in"
-                raise _wrong(file, at, f"{dotted(inner)}: {text} quotes.")
-            if inner in lines:
-                text = f"is given twice, first in line {lines[inner]}."
-                raise _wrong(file, at, f"{dotted(inner)}: {text}")
-            lines[inner] = at
-            _walk(file, value, inner, lines)
+        _refuse(at, (), f"{text} counted wherever it is used; allowed are fewer")
+
+
+def _walk(node: yaml.Node, path: KeyPath, lines: dict[KeyPath, int]) -> None:
+    """Collect the lines of keys and items, and refuse what stands twice or would be misread."""
+    _refuse_many(node, len(path), len(lines))
+    if isinstance(node, yaml.ScalarNode):
+        _refuse_misread(node, path)
     elif isinstance(node, yaml.SequenceNode):
         for index, value in enumerate(node.value):
             lines[(*path, index)] = value.start_mark.line + 1
-            _walk(file, value, (*path, index), lines)
+            _walk(value, (*path, index), lines)
+    elif isinstance(node, yaml.MappingNode):
+        for key, value in node.value:
+            inner = (*path, key.value if isinstance(key, yaml.ScalarNode) else "?")
+            if not key.tag.endswith((":str", ":merge")):
+                text = "is no text: YAML reads on, off, yes, no and numbers otherwise; put it in"
+                _refuse(key, inner, f"{text} quotes")
+            if inner in lines:
+                _refuse(key, inner, f"is given twice, first in line {lines[inner]}")
+            lines[inner] = key.start_mark.line + 1
+            _walk(value, inner, lines)
 
 
-def _wrong(file: Path, line: int | None, text: str) -> BiogripError:
-    place = f", line {line}" if line else ""
-    return BiogripError(f"{shown_path(file)}{place}: {text}")
+def _refuse_misread(node: yaml.ScalarNode, path: KeyPath) -> None:
+    """Refuse a value that YAML 1.1 reads unexpectedly (dates, base 60)."""
+    kind, text = node.tag.rpartition(":")[2], node.value
+    if kind in ("int", "float") and ":" in text:
+        reading = "in base 60; allowed is a number without colons"
+    elif kind == "int" and _OCTAL.fullmatch(text):
+        reading = "in base 8; allowed is a number that does not begin with 0"
+    elif kind == "timestamp":
+        reading = "as a date; allowed is a number"
+    else:
+        return
+    _refuse(node, path, f"found {text}, which YAML reads {reading}, or text in quotes")

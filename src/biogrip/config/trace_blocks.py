@@ -45,17 +45,13 @@ CaseName = Annotated[
 class IntervalBlock(Block):
     """Settings of the intervals, and of what any linear sample would show."""
 
-    confidence: Annotated[
-        float, Field(ge=0.5, le=0.99, description="Confidence level of all intervals.")
-    ]
+    confidence: Annotated[float, Field(ge=0.5, le=0.99)]
+    """Confidence level of all intervals."""
     at_s: Annotated[
-        tuple[Annotated[float, Field(ge=1e-12, le=1e12)], ...],
-        Field(
-            max_length=20,
-            description="Times after a step, and inverses of angular frequencies, at which "
-            "`biogrip identify` tells what any linear sample would show. By default one a decade.",
-        ),
+        tuple[Annotated[float, Field(ge=1e-12, le=1e12)], ...], Field(max_length=20)
     ] = ()
+    """Times after a step, and inverses of angular frequencies, at which `biogrip identify` tells
+    what any linear sample would show. By default one a decade."""
 
 
 @dataclass(frozen=True)
@@ -71,29 +67,20 @@ class ModelSelection(Block):
 class ExperimentBlocks(Block):
     """Blocks of an experiment, which may be the same for several samples."""
 
-    # With descriptions, for docstrings below fields are not inherited.
-    instrument: Annotated[
-        str,
-        OneOf(KINDS),
-        Field(
-            description="`gripper`: a torque is held and a rotation read; `creep`: a force is held "
-            "and a displacement read, or a stress and a strain; `relaxation`: the other way round; "
-            "`oscillation`: a recorded frequency sweep of moduli, for `biogrip identify`. "
-            "The blocks gripper, actuator and calibration are of the first alone."
-        ),
-    ] = GRIPPER.kind
+    instrument: Annotated[str, OneOf(KINDS)] = GRIPPER.kind
+    """`gripper`: a torque is held and a rotation read; `creep`: a force is held and a displacement
+    read, or a stress and a strain; `relaxation`: the other way round; `oscillation`: a recorded
+    frequency sweep of moduli, for `biogrip identify`. The blocks gripper, actuator and calibration
+    are of the first alone."""
     gripper: GripperBlock
     protocol: ProtocolBlock
     measurement: MeasurementBlock
     search_range: SearchRange
     identifiability: IntervalBlock
-    fixed: Annotated[
-        Mapping[str, Annotated[float, Field(ge=0, le=LARGEST_PARAMETER)]],
-        Field(
-            description="Known values of parameters, by name; these are not identified. 0 leaves "
-            "an element out."
-        ),
-    ] = field(default_factory=dict)
+    fixed: Mapping[str, Annotated[float, Field(ge=0, le=LARGEST_PARAMETER)]] = field(
+        default_factory=dict
+    )
+    """Known values of parameters, by name; these are not identified. 0 leaves an element out."""
     least_squares: LeastSquaresSettings
 
 
@@ -155,17 +142,12 @@ class SampleBlocks(ExperimentBlocks):
 class CommonBlocks(Block):
     """Keys of a config that are the same for all of its samples."""
 
-    actuator: Annotated[CombDrive, Field(description="The rotary comb drive (Table 2).")]
+    actuator: CombDrive
+    """The rotary comb drive (Table 2)."""
     model_selection: ModelSelection
-    study_seed: Annotated[
-        int,
-        Field(
-            ge=0,
-            le=2**64 - 1,
-            description="The one seed. Noise and methods draw from streams derived from it, the "
-            "case's name and the number of the trace.",
-        ),
-    ] = 1
+    study_seed: Annotated[int, Field(ge=0, le=2**64 - 1)] = 1
+    """The one seed. Noise and methods draw from streams derived from it, the case's name and the
+    number of the trace."""
 
 
 @dataclass(frozen=True, kw_only=True)

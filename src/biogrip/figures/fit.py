@@ -15,7 +15,7 @@ from biogrip.fit.experiment import Experiment
 from biogrip.physics.instruments import INSTRUMENTS, ROTATION, Channel
 from biogrip.physics.noise import within
 from biogrip.physics.protocol import is_storage
-from biogrip.physics.simulation import simulated_response
+from biogrip.physics.response import simulated_response
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from scipy.interpolate import PchipInterpolator
 from biogrip.arrays import Array
 from biogrip.digits import SUPERSCRIPTS, with_unit
 from biogrip.figures import style
-from biogrip.judging.quantities import quantity_value
+from biogrip.judging.likelihood import quantity_value
 from biogrip.levels import CERTAIN
 
 # End of the axis of profiles, and ratio of the ends above which that of values is logarithmic.

@@ -5,9 +5,6 @@ what these have lost; so do a gripper's arms with such a sample between them. Wh
 non-negative combination of loads that lag behind (`lag_course`), fitted by non-negative least
 squares [2]_.
 
-`proportional_deviations` smooths a trace so: weights that followed each reading's own noise would
-favour readings that are too low by chance.
-
 References
 ----------
 .. [1] S. Bernstein, Sur les fonctions absolument monotones, Acta Mathematica 52 (1929), 1-66.
@@ -20,31 +17,15 @@ from functools import cached_property
 import numpy as np
 
 from biogrip.arrays import Array, BoolArray
-from biogrip.fit.experiment import Experiment
-from biogrip.fit.noise_model_fit import absorbed
-from biogrip.physics.modes import Modes, lag_course
-from biogrip.physics.protocol import SWEEP, Course
+from biogrip.fit.trace_noise import absorbed
+from biogrip.physics.protocol import Course
 from biogrip.physics.residuals import Residuals
+from biogrip.physics.response import Modes
 
-# Lags: shortest over the time between the closest readings, longest over the protocol; how many a
-# decade smooth a trace, and that of what does not relax.
-_SHORTEST, _LONGEST, _A_DECADE, _LASTING = 0.01, 10.0, 4, 1e6
-# The same beyond the frequencies of a sweep.
-_WIDER = 100.0
-# Squares of second differences over their median that are of outliers.
-_OUTLYING = 36.0
-# The smooth rotation and the weights are found in turn.
-_ROUNDS = 4
-# Share of the readings whose scatter bounds the noise from below, and fewest of them.
-_SMALL, _FEWEST = 0.1, 5
-# Their scatter over that of the share, beyond which there is other noise: chi-squared with five
-# degrees of freedom exceeds it once in a thousand times.
-_EXCESS = 2.03
-# Least noise over the largest rotation: rounding errors of single precision.
-_ROUNDING = 1e-7
-
+# Lags: shortest over the time between the closest readings, longest over the protocol.
+_SHORTEST, _LONGEST = 0.01, 10.0
 # Rates a decade, and the fastest but one times the first time.
-_RATES_A_DECADE, _FASTEST = 8, 20.0
+RATES_A_DECADE, _FASTEST = 8, 20.0
 # The slowest times the last time: a line in time to so much.
 _SLOWEST = 1e-8
 # Places at which an interval of rates is divided; how often at most, and decrease of chi^2 that
@@ -202,7 +183,7 @@ def spread_rates(first_s: float, last_s: float) -> Array:
     On the scale log(1 + r `last_s`) they are even, so many a decade. The slowest lag is a line in
     time, the fastest a bare spring or damper. There is one on either side of 1/`first_s`.
     """
-    spacing = np.log(10) / _RATES_A_DECADE
+    spacing = np.log(10) / RATES_A_DECADE
     places = np.arange(0.0, np.log1p(_FASTEST * last_s / first_s) / spacing) * spacing
     inner, middle = np.expm1(places[places > 0]) / last_s, 1 / first_s
     ends = _SLOWEST / last_s, _FASTEST / first_s, 1e6 / first_s
@@ -226,52 +207,3 @@ def fit_responses(trace: Array, responses: Array) -> tuple[Array, float]:
     sizes[sizes == 0] = 1.0
     amplitudes, norm = nnls(rows[:, :-1] / sizes, rows[:, -1])
     return amplitudes / sizes, float(norm**2)
-
-
-def proportional_deviations(problem: Experiment, time_s: Array, readings: Array) -> Array:
-    """Compute standard deviations of readings in proportion to the smooth rotation, (n_samples,).
-
-    The problem has that share, and the standard deviation of further noise. If it is not known, no
-    deviation is less than that of the median of the smallest readings, nor than they scatter: of a
-    rotation of zero, no instrument is certain. Times ascend, (n_samples,).
-    """
-    share, noise_sd = problem.noise_share or 0.0, problem.noise_sd
-    nuisance = problem.nuisance(time_s)
-    lags = [*spread_lags(problem.torque, time_s, _A_DECADE), _LASTING]
-    family = lag_course(problem.torque, lags, time_s)
-    functions = np.vstack((family, nuisance, -nuisance))
-    deviations = np.full(len(time_s), share * np.max(np.abs(readings)))
-    for _ in range(_ROUNDS):
-        amplitudes, _ = fit_responses(readings / deviations, functions / deviations)
-        smooth, rest = amplitudes[: len(family)] @ family, readings - amplitudes @ functions
-        deviations = share * np.abs(smooth)
-        if noise_sd is not None:
-            deviations = np.hypot(deviations, noise_sd)
-        else:
-            deviations = np.maximum(deviations, _least(np.abs(smooth), rest, share))
-    return np.maximum(deviations, _ROUNDING * float(np.max(np.abs(readings))))
-
-
-def spread_swept_lags(places: Array) -> list[float]:
-    """Return lags in s that span any linear sample at places of a sweep, see `Sweep`."""
-    shortest_s, longest_s = SWEEP.spread_s(places)
-    count = int(_RATES_A_DECADE * np.log10(_WIDER**2 * longest_s / shortest_s))
-    lags_s = np.geomspace(shortest_s / _WIDER, longest_s * _WIDER, count).tolist()
-    return [*lags_s, _LASTING * longest_s]
-
-
-def scatter_of(values: Array) -> float:
-    """Return the standard deviation of values by differences of neighbours, without outliers."""
-    squares = np.diff(values, min(len(values) - 1, 2)) ** 2
-    usual = squares[squares <= _OUTLYING * np.median(squares)]
-    return max(float(np.sqrt(np.mean(usual) / 6)), _ROUNDING)
-
-
-def _least(sizes: Array, rest: Array, share: float) -> float:
-    """Return the least standard deviation, from the smallest readings."""
-    few = max(_FEWEST, int(_SMALL * len(sizes)))
-    smallest = np.argsort(sizes, kind="stable")[:few]
-    scatter, size = (np.sqrt(np.mean(own[smallest] ** 2)) for own in (rest, sizes))
-    if scatter <= _EXCESS * share * size:
-        return share * float(np.median(sizes[smallest]))
-    return float(scatter)

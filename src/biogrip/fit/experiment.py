@@ -1,6 +1,6 @@
 """What was done with a sample, which all traces of a case share."""
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -9,20 +9,13 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.fit.least_squares import LeastSquaresSettings
 from biogrip.fit.problem import GeneRange, TraceProblem, make_problem
-from biogrip.physics.condensed import Condensed, SweptRows
+from biogrip.fit.trace_noise import WEIGHTED, NoiseModel, whitened_rows
+from biogrip.physics.condensed import Condensed
 from biogrip.physics.fractional import LONGEST_S, on_clock
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import Instrument, in_contact
 from biogrip.physics.models import Sample
-from biogrip.physics.noise import (
-    WEIGHTED,
-    NoiseModel,
-    PairWhitening,
-    Whitening,
-    nuisance_basis,
-    stream,
-    with_uncertain,
-)
+from biogrip.physics.noise import nuisance_basis, stream
 from biogrip.physics.protocol import SWEEP, Course, Phase, follow_rows, join_phases
 from biogrip.physics.residuals import CondensedTrace, Residuals
 from biogrip.physics.sample_model import SampleModel, with_fixed
@@ -134,6 +127,11 @@ class Experiment:
         """Unit of time in which power laws hold as long as the protocol lasts."""
         lasts = 1.0 if self.instrument.sweeps else sum(phase.duration_s for phase in self.phases)
         return lasts if lasts < _SHORT_S else max(lasts / LONGEST_S, 1.0)
+
+    def without_terms(self, names: Collection[str]) -> "Experiment":
+        """Leave out an ``offset``, or a ``drift``, of the instrument."""
+        offset, drift = self.offset and "offset" not in names, self.drift and "drift" not in names
+        return replace(self, offset=offset, drift=drift)
 
     def to_identify(self, *others: SampleModel) -> "Experiment":
         """Leave out noise model, gripper uncertainty, and ranges neither it nor `others` use."""
@@ -251,18 +249,11 @@ class Experiment:
         with a random amplitude, see `with_uncertain`; noise may grow with a rotation, see
         `Whitening`: (n_functions, n_samples) and (n_samples,).
         """
-        nuisance = self.nuisance(time_s)
-        uncertain = nuisance[:0] if uncertain is None else uncertain
-        rows = SweptRows if self.torque.sweeps else Condensed
-        given = self.torque, self.torque.snapped(time_s)
-        if noise_model is None and self.sd is not None and self.correlation is not None:
-            return rows(*given, nuisance[:0], PairWhitening(time_s, self.sd, self.correlation))
+        correlation = None
         if noise_model is None and self.sd is not None:
-            noise_model, growing = WEIGHTED, self.sd
-        if noise_model is None:
-            return rows(*given, with_uncertain(nuisance, uncertain))
-        whitening = Whitening(time_s, noise_model, nuisance, uncertain, growing)
-        return rows(*given, nuisance[:0], whitening)
+            noise_model, growing, correlation = WEIGHTED, self.sd, self.correlation
+        given = self.torque, time_s, self.nuisance(time_s), noise_model, uncertain
+        return whitened_rows(*given, growing, correlation)
 
     def logs(self, parameters: Mapping[str, float]) -> Array:
         """Return log-parameters of the searched parameters, zeros replaced by the lower bound."""

@@ -15,10 +15,10 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.fit.problem import TraceProblem
 from biogrip.physics.condensed import Condensed, SweptRows
-from biogrip.physics.modes import Modes, compute_modes
 from biogrip.physics.noise import moduli_of, places_of, with_uncertain
 from biogrip.physics.protocol import is_storage, spacing_at
 from biogrip.physics.residuals import CondensedTrace, Residuals
+from biogrip.physics.response import Modes, compute_modes
 from biogrip.physics.sample_model import Network
 
 # Step of a start over the time between readings: none of them lies so close to a step.

@@ -15,7 +15,7 @@ References
 .. [3] R. E. Kass and A. E. Raftery, Journal of the American Statistical Association 90 (1995), 773.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -25,10 +25,9 @@ from numpy.typing import ArrayLike
 import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray
 from biogrip.digits import counted, plain
-from biogrip.fit.least_squares import LeastSquaresSettings, fit_from, identify_many
+from biogrip.fit.least_squares import LeastSquaresSettings, fit_from, identify_many, refit
 from biogrip.fit.problem import Fit, TraceProblem, silent
 from biogrip.physics.models import CANDIDATES, as_richer, contained, different_in
-from biogrip.physics.sample_model import SampleModel
 
 # Factors by which an element that has vanished exceeds a usual one, or falls short of it, at a
 # start; and the usual relaxation time as a share of the length of the experiment.
@@ -198,7 +197,7 @@ def _is_noticeably_lower(misfit: float, than: float, problem: TraceProblem) -> b
 
 def _better_from(answer: Fit, problem: TraceProblem, start: Array) -> Fit:
     """Return the fit from a start if its misfit is lower, or else the answer itself."""
-    again = answer.at(fit_from([problem], start))
+    again = refit(answer, problem, start)
     return again if _digits(again.misfit) < _digits(answer.misfit) else answer
 
 
@@ -220,23 +219,6 @@ def is_within(parameters: Array, problem: TraceProblem) -> bool:
     return bool(np.all((x >= problem.low) & (x <= problem.high)))
 
 
-@dataclass(frozen=True)
-class FittedModel:
-    """A sample model fitted to a trace."""
-
-    candidate: str
-    """Name of the model in `CANDIDATES`."""
-    delta_aic: float
-    """AIC minus the lowest of the models tried."""
-    delta_bic: float
-    """BIC, likewise."""
-
-    @property
-    def model(self) -> SampleModel:
-        """The sample model of that name."""
-        return CANDIDATES[self.candidate].model
-
-
 def aic_and_bic(
     misfit: ArrayLike, samples: ArrayLike, parameters: ArrayLike
 ) -> tuple[Array, Array]:
@@ -250,105 +232,28 @@ def aic_and_bic(
     return square + 2 * free, square + free * np.log(samples)
 
 
-def ranked(candidates: Sequence[str], misfits: Sequence[float], samples: int) -> list[FittedModel]:
-    """Compare the best fits of several models to one trace by AIC and BIC, keeping their order."""
-    counts = [len(CANDIDATES[name].model.names) for name in candidates]
-    criteria = aic_and_bic(misfits, samples, counts)
-    aic, bic = (values - values.min() for values in criteria)
-    return [
-        FittedModel(name, float(a), float(b))
-        for name, a, b in zip(candidates, aic, bic, strict=True)
-    ]
+def ranked(
+    candidates: Sequence[str], misfits: Sequence[float], samples: int
+) -> dict[str, tuple[float, float]]:
+    """Compute AIC and BIC of the best fits of models to one trace, by name, over their lowest."""
+    aic, bic = aic_and_bic(misfits, samples, [_count_parameters(name) for name in candidates])
+    values = zip((aic - aic.min()).tolist(), (bic - bic.min()).tolist(), strict=True)
+    return dict(zip(candidates, values, strict=True))
 
 
-def _own_and_best(tried: Sequence[FittedModel], chosen: str) -> tuple[FittedModel, FittedModel]:
-    """Return the chosen model and the one that BIC prefers to it, or itself."""
-    chosen_fit = next(fitted for fitted in tried if fitted.candidate == chosen)
-    best = min(tried, key=lambda fitted: fitted.delta_bic)
-    simpler = len(best.model.names) < len(chosen_fit.model.names)
-    needed = levels.WORTH_A_MENTION if simpler else levels.STRONG
-    return chosen_fit, best if chosen_fit.delta_bic >= needed else chosen_fit
-
-
-def preferred(tried: Sequence[FittedModel], chosen: str) -> str | None:
-    """Return the candidate that BIC prefers to the chosen model by more than chance, or None."""
-    chosen_fit, best = _own_and_best(tried, chosen)
-    return None if best is chosen_fit else best.candidate
-
-
-def preferred_simpler(tried: Sequence[FittedModel], chosen: str) -> str | None:
-    """Return the candidate that BIC prefers, if it is simpler and fits about as well; else None."""
-    chosen_fit, best = _own_and_best(tried, chosen)
-    more = len(chosen_fit.model.names) - len(best.model.names)
-    # Difference of n ln(misfit^2), which leaves the number of parameters aside.
-    worse = chosen_fit.delta_aic - best.delta_aic - 2 * more
-    return best.candidate if more > 0 and worse <= levels.WORTH_A_MENTION else None
-
-
-def fits_far_better(tried: Sequence[FittedModel], chosen: str) -> bool:
-    """Return True if BIC prefers another model, simpler or richer, and not for its size alone."""
-    return preferred(tried, chosen) is not None and preferred_simpler(tried, chosen) is None
-
-
-def one_branch_more(tried: Sequence[FittedModel], *, adequate: bool = True) -> str | None:
-    """Return the candidate with one branch more than the best, if it was not tried; else None.
-
-    Where the best is not adequate, it is one more than the best Maxwell-Wiechert model.
-    """
-    rich = [fitted for fitted in tried if fitted.model.free_branches and not fitted.model.power_law]
-    among = tried if adequate else rich or tried
-    best = min(among, key=lambda fitted: fitted.delta_bic).candidate
-    names = (name for name in CANDIDATES if CANDIDATES[name].model.free_branches)
-    richer = (name for name in names if list(CANDIDATES[name].model.contains)[:1] == [best])
-    name = next(richer, None)
-    return None if name in {fitted.candidate for fitted in tried} else name
-
-
-def advice(
-    tried: Sequence[FittedModel], chosen: str, *, adequate: bool = True, spared: int = 0
-) -> str:
-    """State in a sentence whether BIC prefers another of the models tried, if adequate, to one."""
-    chosen_fit, best = _own_and_best(tried, chosen)
-    title = chosen_fit.model.title[0].upper() + chosen_fit.model.title[1:]
-    if best is chosen_fit:
-        return f"{title}: {_none_better(tried, chosen_fit, spared)}"
-    named = f"{best.model.title} (--model {best.candidate})"
-    lower = f"with a BIC lower by {plain(chosen_fit.delta_bic)}"
-    if not adequate:
-        return (
-            f"None of the {len(tried)} models tried is adequate: the best of them, {named}, "
-            f"{lower}, leaves more than noise, too."
-        )
-    if preferred_simpler(tried, chosen):
-        return f"A simpler model, {named}, fits as well, {lower}."
-    lead = f"{named} is preferred, {lower}."
-    if len(best.model.names) == len(chosen_fit.model.names):
-        return f"{title} suits the trace less well: {lead}"
-    return f"{title} is not adequate: {lead}"
-
-
-def _none_better(tried: Sequence[FittedModel], chosen: FittedModel, spared: int) -> str:
-    """State that none is preferred, how many were not fitted, and what is simpler and as good."""
-    more = f"; {spared} more could not, however well they fit" if spared else ""
-    said = f"none of the {len(tried)} models tried suits the trace better{more}."
-    lowest = min(tried, key=lambda fitted: fitted.delta_bic)
-    fewer = len(chosen.model.names) - len(lowest.model.names)
-    if fewer <= 0:
-        return said
-    as_good = f"suits it as well with {counted(fewer, 'parameter')} less"
-    named = f"{lowest.model.title} (--model {lowest.candidate})"
-    return f"{said} {named} {as_good} (BIC lower by {plain(chosen.delta_bic)})."
+def _count_parameters(name: str) -> int:
+    return len(CANDIDATES[name].model.names)
 
 
 @dataclass(frozen=True)
 class FittedModels:
-    """Best fits of sample models to a trace."""
+    """Best fits of sample models to a trace, and which of them BIC prefers."""
 
     chosen: str
     """Sample model that the trace was identified with."""
-    tried: list[FittedModel] = field(default_factory=list)
-    """Rank of each model."""
-    answers: dict[str, Fit] = field(default_factory=dict)
+    tried: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    """AIC and BIC of each model by its name, minus the lowest of the models tried."""
+    answers: Mapping[str, Fit] = field(default_factory=dict)
     """Fit of each by its name, in the same order."""
     adequate: bool = True
     """False if that of the model which BIC prefers is rejected for what it leaves."""
@@ -358,10 +263,66 @@ class FittedModels:
     @property
     def lead(self) -> float:
         """How much lower than that of the chosen model the BIC of another is."""
-        return max(
-            (fitted.delta_bic for fitted in self.tried if fitted.candidate == self.chosen),
-            default=0.0,
-        )
+        return self.tried.get(self.chosen, (0.0, 0.0))[1]
+
+    def _lowest(self, names: Iterable[str]) -> str:
+        """Return the model of lowest BIC."""
+        return min(names, key=lambda name: self.tried[name][1])
+
+    @property
+    def preferred(self) -> str | None:
+        """The model that BIC prefers to the chosen one by more than chance, if any."""
+        name = self._lowest(self.tried) if self.tried else self.chosen
+        simpler = _count_parameters(name) < _count_parameters(self.chosen)
+        return name if self.lead >= (levels.WORTH_A_MENTION if simpler else levels.STRONG) else None
+
+    @property
+    def far_better(self) -> bool:
+        """True if BIC prefers another model, simpler or richer, and not for its size alone."""
+        if (name := self.preferred) is None:
+            return False
+        fewer = _count_parameters(self.chosen) - _count_parameters(name)
+        # Difference of n ln(misfit^2), which leaves the number of parameters aside.
+        worse = self.tried[self.chosen][0] - self.tried[name][0] - 2 * fewer
+        return fewer <= 0 or worse > levels.WORTH_A_MENTION
+
+    def one_branch_more(self) -> str | None:
+        """Return the model with one branch more than the best, if it was not tried; else None.
+
+        Where the best is not adequate, it is one more than the best Maxwell-Wiechert model.
+        """
+        branched = [name for name in CANDIDATES if CANDIDATES[name].model.free_branches]
+        rich = [name for name in branched if not CANDIDATES[name].model.power_law]
+        among = [] if self.adequate else [name for name in self.tried if name in rich]
+        best = self._lowest(among or self.tried)
+        richer = (name for name in branched if [*CANDIDATES[name].model.contains][:1] == [best])
+        name = next(richer, None)
+        return None if name in self.tried else name
+
+    def advice(self) -> str:
+        """State in a sentence whether BIC prefers another of the models tried to the chosen one."""
+        title = CANDIDATES[self.chosen].model.title
+        title = title[0].upper() + title[1:]
+        best = self.preferred or self._lowest(self.tried)
+        named = f"{CANDIDATES[best].model.title} (--model {best})"
+        fewer = _count_parameters(self.chosen) - _count_parameters(best)
+        count, lower = len(self.tried), f"BIC lower by {plain(self.lead)}"
+        if self.preferred is None:
+            more = f"; {len(self.spared)} more could not, however well they fit"
+            said = f"{title}: none of the {count} models tried suits the trace better"
+            said += f"{more if self.spared else ''}."
+            as_good = f"{named} suits it as well with {counted(fewer, 'parameter')} less ({lower})."
+            return f"{said} {as_good}" if fewer > 0 else said
+        lower = f"with a {lower}"
+        if not self.adequate:
+            return (
+                f"None of the {count} models tried is adequate: the best of them, {named}, "
+                f"{lower}, leaves more than noise, too."
+            )
+        if not self.far_better:
+            return f"A simpler model, {named}, fits as well, {lower}."
+        what = "is not adequate" if fewer else "suits the trace less well"
+        return f"{title} {what}: {named} is preferred, {lower}."
 
     def data(self, *, rejected: bool) -> dict[str, Any]:
         """Return one row per model, and advice in words, as plain data.
@@ -371,36 +332,26 @@ class FittedModels:
         """
         rows = [
             {
-                "model": fitted.candidate,
-                "title": fitted.model.title,
-                "parameters": len(fitted.model.names),
-                "misfit_rad": self.answers[fitted.candidate].misfit,
-                "vanished": vanished(fitted.candidate, self.answers[fitted.candidate]),
-                "converged": self.answers[fitted.candidate].converged,
-                "delta_aic": fitted.delta_aic,
-                "delta_bic": fitted.delta_bic,
+                "model": name,
+                "title": CANDIDATES[name].model.title,
+                "parameters": _count_parameters(name),
+                "misfit_rad": answer.misfit,
+                "vanished": vanished(name, answer),
+                "converged": answer.converged,
+                "delta_aic": self.tried[name][0],
+                "delta_bic": self.tried[name][1],
             }
-            for fitted in self.tried
+            for name, answer in self.answers.items()
         ]
-        words = None
-        if rows and (not rejected or fits_far_better(self.tried, self.chosen)):
-            more = len(self.spared)
-            words = advice(self.tried, self.chosen, adequate=self.adequate, spared=more)
-        best = preferred(self.tried, self.chosen) if rows and self.adequate else None
         return {
             "models": rows,
             "models_spared": [CANDIDATES[name].model.title for name in self.spared],
-            "preferred_model": best,
-            "advice": words,
+            "preferred_model": self.preferred if self.adequate else None,
+            "advice": self.advice() if rows and (not rejected or self.far_better) else None,
         }
 
 
 def vanished(candidate: str, answer: Fit) -> list[str]:
     """Name the elements that vanish in the best fit: parameters that are zero or infinite."""
-    gone = (answer.parameters == 0) | np.isinf(answer.parameters)
-    elements = zip(CANDIDATES[candidate].model.parameters, gone, strict=True)
-    return [
-        parameter.name
-        for parameter, is_gone in elements
-        if is_gone and parameter.kind != "exponent"
-    ]
+    elements = zip(CANDIDATES[candidate].model.parameters, answer.parameters, strict=True)
+    return [p.name for p, size in elements if size in (0, np.inf) and p.kind != "exponent"]

@@ -8,7 +8,6 @@ import numpy as np
 from pydantic import Field
 
 from biogrip.arrays import Array, IntArray
-from biogrip.fit.levenberg_marquardt import Minima
 from biogrip.keys import Block, Complaint
 from biogrip.physics.residuals import Residuals
 from biogrip.physics.sample_model import SampleModel
@@ -149,11 +148,6 @@ class Fit:
     """Course of the identification; that of what was fitted first, where more fits followed."""
     converged: bool = True
     """False if the last local fit did not converge."""
-
-    def at(self, fit: Minima) -> "Fit":
-        """Return a copy with the optimum of a local fit of this trace alone."""
-        misfit, converged = float(fit.misfit[0]), bool(fit.converged[0])
-        return replace(self, parameters=np.exp(fit.x[0]), misfit=misfit, converged=converged)
 
     def in_order(self, model: SampleModel) -> "Fit":
         """Return a copy with Maxwell branches sorted by relaxation time, in its history as well."""

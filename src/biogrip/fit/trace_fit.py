@@ -15,18 +15,18 @@ import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.digits import counted, rounded
 from biogrip.fit.experiment import Experiment, pose
-from biogrip.fit.least_squares import fit_from, identify_many
+from biogrip.fit.least_squares import identify_many, refit
 from biogrip.fit.nested_fits import deepen
-from biogrip.fit.noise_model_fit import (
+from biogrip.fit.problem import Fit, ReportProgress, TraceProblem, silent
+from biogrip.fit.trace_noise import (
+    NoiseModel,
     NoiseModelLikelihood,
     absorbed,
     growth_left,
     outliers_of,
 )
-from biogrip.fit.problem import Fit, ReportProgress, TraceProblem, silent
-from biogrip.physics.noise import NoiseModel, drift_is_flow
 from biogrip.physics.protocol import Phase, join_phases
-from biogrip.physics.simulation import simulated_response
+from biogrip.physics.response import simulated_response
 
 # Square of three standard uncertainties.
 _SECOND_ORDER = 9.0
@@ -171,9 +171,6 @@ _NOISE_SETTLED = 1e-2
 # The same of a fit that moves by less, in standard deviations.
 _FIT_SETTLED = 0.03
 
-Find = Callable[[Sequence[TraceProblem]], list[Fit]]
-"""Function that finds the global optima of problems."""
-
 
 @dataclass(frozen=True)
 class TraceFit:
@@ -189,44 +186,39 @@ class TraceFit:
     """True for readings that were left out, (n_samples,)."""
     errors: tuple[float, float] = (0.0, 0.0)
     """Standard deviations of logarithms of the noise model: of its time, and of its walk's odds."""
-    fitted_along: str = ""
-    """Terms of the instrument that were fitted along, in words."""
 
     def noise_data(self) -> dict[str, float | None] | None:
         """Return the estimated noise model as plain data; None if noise was assumed white."""
         if self.noise_model is None:
             return None
         shares = {"white": self.noise_model.white, **vars(self.noise_model)}
-        return {
-            **{name: rounded(share) for name, share in shares.items()},
-            "degrees_of_freedom": rounded(self.problem.residuals.freedom),
-            "outliers": int(np.count_nonzero(self.outliers)),
-        }
+        shares |= {"degrees_of_freedom": self.problem.residuals.freedom}
+        outliers = int(np.count_nonzero(self.outliers))
+        return {**{name: rounded(number) for name, number in shares.items()}, "outliers": outliers}
 
     def notes(self) -> list[str]:
         """Describe the estimated noise model in sentences."""
         if self.noise_model is None:
             return []
-        read = self.problem.residuals.instrument.read.name
         noise_model, left_out = self.noise_model, int(np.count_nonzero(self.outliers))
-        others = {
+        read = self.problem.residuals.instrument.read.name
+        shares = {
+            "white": noise_model.white,
             f"correlated over some {noise_model.time_s:.2g} s": noise_model.ar1,
             "1/f": noise_model.flicker,
             "a random walk": noise_model.walk,
             f"that grows with the {read}": noise_model.proportional,
         }
-        parts = [f"{100 * noise_model.white:.0f} % white"]
-        parts += [
-            f"{100 * n:.0f} % {what}" for what, n in others.items() if n >= levels.WORTH_SAYING
+        parts = [
+            f"{100 * share:.0f} % {what}"
+            for what, share in shares.items()
+            if what == "white" or share >= levels.WORTH_SAYING
         ]
-        said = [
-            f"Noise model: of the variance {', '.join(parts)};{self.fitted_along} "
-            "the intervals allow for all of it."
-        ]
-        if left_out:
-            samples = counted(left_out, "sample")
-            said.append(f"Left out as outliers: {samples} of {len(self.outliers)}.")
-        return said
+        said = (
+            f"Noise model: of the variance {', '.join(parts)}; the intervals allow for all of it."
+        )
+        struck = f"Left out as outliers: {counted(left_out, 'sample')} of {len(self.outliers)}."
+        return [said, struck] if left_out else [said]
 
 
 def fit_least_squares(
@@ -263,93 +255,69 @@ def fit_least_squares(
     return [fits_by_trace[trace] for trace in range(len(traces))]
 
 
-def _fit_in_noise(experiment: Experiment, time_s: Array, readings: Array, find: Find) -> TraceFit:
-    kept, plain, best_fit = _without_outliers(experiment, time_s, readings, find)
-    time_s, readings = time_s[kept], readings[kept]
-    problem, best_fit, noise_model, errors = _in_turn(experiment, time_s, readings, plain, best_fit)
-    # Slow deviations now weigh less, so that another basin may be the deepest.
-    (other,) = find([problem])
-    if np.float32(other.misfit) < np.float32(best_fit.misfit):
-        best_fit = other
-    along = _terms_fitted_along(experiment, time_s)
-    return TraceFit(problem, best_fit, noise_model, ~kept, errors, along)
-
-
-def _terms_fitted_along(experiment: Experiment, time_s: Array) -> str:
-    terms = ["an offset"] * experiment.offset + ["a drift"] * experiment.drift
-    if not terms:
-        return ""
-    controlled = experiment.instrument.controlled.name
-    or_flow = f" (or the sample flows: under this {controlled} both give the same line)"
-    doubt = or_flow if experiment.drift and drift_is_flow(experiment.torque, time_s) else ""
-    verb = "are" if len(terms) > 1 else "is"
-    return f" {' and '.join(terms)} of the instrument{doubt} {verb} fitted along, and"
-
-
-def _without_outliers(
-    experiment: Experiment, time_s: Array, readings: Array, find: Find
-) -> tuple[BoolArray, TraceProblem, Fit]:
-    """Strike outliers, if the noise may have any, and fit again, until there are no more."""
-    kept, plain = np.ones(len(time_s), dtype=bool), experiment.of(time_s, readings)
-    for _ in range(_MOST_ROUNDS):
-        (best_fit,) = find([plain])
-        if not experiment.coloured:
-            break
-        residual = plain.residuals.left(np.log(best_fit.parameters))
-        growth = growth_left(plain.residuals, np.log(best_fit.parameters))
-        struck = outliers_of(residual / growth, plain.residuals.trace.rounding)
-        if not struck.any():
-            break
-        kept[np.flatnonzero(kept)[struck]] = False
-        plain = experiment.of(time_s[kept], readings[kept])
-    return kept, plain, best_fit
-
-
-def _in_turn(
+def _fit_in_noise(
     experiment: Experiment,
     time_s: Array,
     readings: Array,
-    plain: TraceProblem,
-    best_fit: Fit,
-) -> tuple[TraceProblem, Fit, NoiseModel | None, tuple[float, float]]:
+    find: Callable[[Sequence[TraceProblem]], list[Fit]],
+) -> TraceFit:
+    """Fit a trace whose noise is not plain, by a function that finds global optima of problems."""
+    kept = np.ones(len(time_s), dtype=bool)
+    for rounds_left in reversed(range(_MOST_ROUNDS)):
+        # Outliers are struck, if the noise may have any, until there are no more.
+        plain = experiment.of(time_s[kept], readings[kept])
+        (best_fit,) = find([plain])
+        best, residuals = np.log(best_fit.parameters), plain.residuals
+        growth = growth_left(residuals, best) if experiment.coloured else np.ones(1)
+        struck = outliers_of(residuals.left(best) / growth, residuals.trace.rounding)
+        if not (experiment.coloured and rounds_left and struck.any()):
+            break
+        kept[np.flatnonzero(kept)[struck]] = False
+    fit = _in_turn(experiment, time_s[kept], plain, best_fit, grows=bool(np.ptp(growth)))
+    # Slow deviations now weigh less, so that another basin may be the deepest.
+    (other,) = find([fit.problem])
+    deeper = np.float32(other.misfit) < np.float32(fit.found.misfit)
+    return replace(fit, found=other if deeper else fit.found, outliers=~kept)
+
+
+def _in_turn(
+    experiment: Experiment, time_s: Array, plain: TraceProblem, best_fit: Fit, *, grows: bool
+) -> TraceFit:
     """Estimate the noise from the residuals and fit again with it, until the fit converges."""
-    problem, noise_model = plain, None
-    growth = growth_left(plain.residuals, np.log(best_fit.parameters))
-    grows = experiment.coloured and np.ptp(growth) > 0
+    readings, nuisance = plain.residuals.trace.readings, experiment.nuisance(time_s)
+    fit = TraceFit(plain, best_fit, None, np.zeros(len(time_s), dtype=bool))
     for _ in range(_MOST_ROUNDS):
-        start = np.log(best_fit.parameters)
+        before, start = fit, np.log(fit.found.parameters)
         residual, sensitivity = plain.residuals(start)
-        of_load = load_functions(experiment, time_s, best_fit.parameters, sensitivity)
-        uncertain = gripper_functions(experiment, time_s, best_fit.parameters)
+        of_load = load_functions(experiment, time_s, fit.found.parameters, sensitivity)
+        uncertain = gripper_functions(experiment, time_s, fit.found.parameters)
         uncertain = np.vstack((uncertain, of_load))
         if experiment.fit_contact:
-            of_contact = contact_function(experiment, time_s, best_fit.parameters)
+            of_contact = contact_function(experiment, time_s, fit.found.parameters)
             free = _FREE_OVER_NOISE * np.linalg.norm(residual) / np.linalg.norm(of_contact)
             uncertain = np.vstack((uncertain, free * of_contact))
-        left = problem.residuals.free - len(best_fit.parameters)
-        noise_sd = experiment.noise_sd or best_fit.misfit * np.sqrt(len(time_s) / left)
+        left = fit.problem.residuals.free - len(start)
+        noise_sd = experiment.noise_sd or fit.found.misfit * np.sqrt(len(time_s) / left)
         if len(of_load) and experiment.noise_sd is None:
             noise_sd = noise_beside(residual, of_load, left)
-        before: NoiseModel | None = noise_model
-        growing = plain.residuals.response(start) if grows else None
+        noise_model, growing = None, plain.residuals.response(start) if grows else None
         if experiment.coloured:
-            nuisance = experiment.nuisance(time_s)
             directions = np.vstack((sensitivity, nuisance, uncertain))
             likelihood = NoiseModelLikelihood(time_s, residual, directions, growing)
-            noise_model = likelihood.best(near=before)
+            noise_model = likelihood.best(near=fit.noise_model)
         condensed = experiment.in_noise(time_s, noise_model, uncertain / noise_sd, growing=growing)
         problem = experiment.of(time_s, readings, condensed=condensed)
-        best_fit = best_fit.at(fit := fit_from([problem], start))
-        slopes = problem.residuals.condensed_responses(fit.x)[0, 1:]
-        moved = np.linalg.norm((fit.x[0] - start) @ slopes) / noise_sd
-        if moved < _FIT_SETTLED and _has_settled(before, noise_model):
+        fit = TraceFit(problem, refit(fit.found, problem, start), noise_model, fit.outliers)
+        end = np.log(fit.found.parameters)
+        slopes = problem.residuals.condensed_responses(end[None])[0, 1:]
+        moved = np.linalg.norm((end - start) @ slopes) / noise_sd
+        if moved < _FIT_SETTLED and _has_settled(before.noise_model, noise_model):
             break
-    errors = 0.0, 0.0
-    if noise_model is not None:
-        errors = likelihood.errors(noise_model)
-        freedom = likelihood.freedom(noise_model, sensitivity / noise_sd, nuisance)
-        problem = replace(problem, residuals=replace(problem.residuals, freedom=freedom))
-    return problem, best_fit, noise_model, errors
+    if noise_model is None:
+        return fit
+    freedom = likelihood.freedom(noise_model, sensitivity / noise_sd, nuisance)
+    problem = replace(problem, residuals=replace(problem.residuals, freedom=freedom))
+    return replace(fit, problem=problem, errors=likelihood.errors(noise_model))
 
 
 def _has_settled(one: NoiseModel | None, other: NoiseModel | None) -> bool:

@@ -15,20 +15,19 @@ from scipy.special import chdtri, stdtrit
 import biogrip.levels as levels
 from biogrip.arrays import Array
 from biogrip.digits import plain
-from biogrip.fit.any_sample import fit_responses, spread_lags
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import identify_many
-from biogrip.fit.noise_model_fit import absorbed
 from biogrip.fit.problem import silent
 from biogrip.fit.trace_fit import contact_function
+from biogrip.fit.trace_noise import absorbed
+from biogrip.identify.load_noise import left_by_any
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.judging.doubts import DOUBT, REJECTED, REJECTION, Note
-from biogrip.physics.modes import lag_course
 from biogrip.physics.noise import without
 from biogrip.traces.reader import Recording
 
-# Contacts that are tried, up to this share of the largest depth off; lags a decade; most steps.
-_DEPTHS_TRIED, _FURTHEST, _LAGS_OF_CONTACT, _MOST_EVALUATIONS = 41, 0.5, 2, 50
+# Contacts that are tried, up to this share of the largest depth off; most steps.
+_DEPTHS_TRIED, _FURTHEST, _MOST_EVALUATIONS = 41, 0.5, 50
 
 
 def with_contact(experiment: Experiment, recording: Recording) -> Experiment:
@@ -37,16 +36,9 @@ def with_contact(experiment: Experiment, recording: Recording) -> Experiment:
     assert experiment.tip_power is not None
     time_s, readings = recording.time_s, recording.readings
     deepest = float(experiment.record[:, 1].max()) ** (1 / experiment.tip_power)
-    lags = spread_lags(experiment.torque, time_s, _LAGS_OF_CONTACT)
-    nuisance = experiment.nuisance(time_s)
-
-    def rest(deeper: float) -> float:
-        course = replace(experiment, deeper=deeper).torque
-        responses = without(nuisance, lag_course(course, lags, time_s))
-        return fit_responses(without(nuisance, readings), responses)[1]
-
     tried = deepest * np.linspace(-_FURTHEST, _FURTHEST, _DEPTHS_TRIED)
-    guess = replace(experiment, deeper=float(min(tried, key=rest)))
+    guesses = [replace(experiment, deeper=deeper) for deeper in tried.tolist()]
+    guess = guesses[int(np.argmin(left_by_any(guesses, time_s, readings)))]
     return replace(experiment, deeper=_fitted(guess, time_s, readings))
 
 
@@ -85,13 +77,11 @@ def depth_off(diagnosis: Diagnosis) -> tuple[float, float, float]:
     """
     recording, experiment = diagnosis.identified
     likelihood, exact = diagnosis.likelihood, experiment.to_identify()
-    residuals, read = (
-        exact.of(recording.time_s, recording.readings).residuals,
-        recording.read.instrument.read,
-    )
+    residuals = exact.of(recording.time_s, recording.readings).residuals
     left, slopes = residuals(likelihood.best)
     if experiment.tip_power is None:
         # A depth that is read is less by what the tip is deeper.
+        read = recording.read.instrument.read
         change = -read.slope(np.abs(residuals.response(likelihood.best)) ** (1 / read.power))
     else:
         change = contact_function(exact, recording.time_s, np.exp(likelihood.best))
@@ -109,13 +99,10 @@ def depth_off(diagnosis: Diagnosis) -> tuple[float, float, float]:
 def depth_limits(diagnosis: Diagnosis) -> tuple[float, float, float]:
     """Return by how much a tip is deeper than recorded, in m, and its limits."""
     recording, experiment = diagnosis.identified
-    _, shown, _ = depth_off(diagnosis)
-    freedom = min(diagnosis.likelihood.freedom, 1e9)
-    room = np.divide(diagnosis.likelihood.noise_sd, shown) * float(
-        stdtrit(freedom, 0.5 + diagnosis.likelihood.confidence / 2)
-    )
-    unit = recording.read.instrument.controlled.units["m"]
-    middle = experiment.deeper
+    likelihood, (_, shown, _) = diagnosis.likelihood, depth_off(diagnosis)
+    sds = float(stdtrit(min(likelihood.freedom, 1e9), 0.5 + likelihood.confidence / 2))
+    room = np.divide(likelihood.noise_sd, shown) * sds
+    unit, middle = recording.read.instrument.controlled.units["m"], experiment.deeper
     return middle / unit, (middle - room) / unit, (middle + room) / unit
 
 

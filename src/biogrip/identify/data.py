@@ -10,9 +10,9 @@ from biogrip.fit.experiment import Experiment
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.judging.doubts import REJECTED, REJECTION, find_reasons, order_notes
 from biogrip.judging.linearity import NOT_LINEAR
-from biogrip.judging.verdicts import FIT_REJECTED, Finding
+from biogrip.judging.profiles import FIT_REJECTED, Finding
 from biogrip.physics.noise import within
-from biogrip.physics.simulation import simulated_response
+from biogrip.physics.response import simulated_response
 from biogrip.traces.reader import Recording
 
 
@@ -29,6 +29,10 @@ def judged_data(diagnosis: Diagnosis) -> dict[str, Any]:
         remarks = diagnosis.recording.remarks() if diagnosis.recording else []
         notes = [note for note in notes if note.weight == REJECTION or note.text in remarks]
     ordered = order_notes(notes)
+    trades = [
+        {"members": list(trade.members), "words": trade.words(), **_finding(trade.finding)}
+        for trade in ([] if rejected else diagnosis.trades)
+    ]
     return {
         "fit": diagnosis.status,
         "reasons": find_reasons(ordered),
@@ -38,41 +42,33 @@ def judged_data(diagnosis: Diagnosis) -> dict[str, Any]:
         "scatter_rad": likelihood.problem.residuals.noise_scale,
         "threshold": likelihood.threshold,
         "certainty": likelihood.certainty,
-        "quantities": [_finding(each, rejected=rejected) for each in diagnosis.findings],
+        "quantities": [_finding(finding, rejected=rejected) for finding in diagnosis.findings],
         "moves": [asdict(move) for move in diagnosis.moves],
-        "trades": [
-            {
-                "members": list(trade.members),
-                "words": trade.words(),
-                **_finding(trade.finding, rejected=False),
-            }
-            for trade in ([] if rejected else diagnosis.trades)
-        ],
+        "trades": trades,
         **({"jaw_force": dict(vars(diagnosis.grip))} if diagnosis.grip else {}),
         "notes": [{"weight": note.weight, "text": note.text} for note in ordered],
     }
 
 
-def _finding(finding: Finding, *, rejected: bool) -> dict[str, Any]:
-    profile = finding.profile
-    best = f"{plain(finding.value)} {finding.quantity.unit}".rstrip()
+def _finding(finding: Finding, *, rejected: bool = False) -> dict[str, Any]:
+    quantity = finding.quantity
+    best = f"{plain(finding.value)} {quantity.unit}".rstrip()
+    no_use = f"fit rejected: the best fit, {best}, is not to be used"
     return {
-        "quantity": finding.quantity.label,
-        "symbol": finding.quantity.symbol,
-        "unit": finding.quantity.unit,
+        "quantity": quantity.label,
+        "symbol": quantity.symbol,
+        "unit": quantity.unit,
         "verdict": FIT_REJECTED if rejected else finding.verdict,
         "value": finding.value,
         "low": None if rejected else finding.low,
         "high": None if rejected else finding.high,
-        "excluded": [] if rejected else [[start, end] for start, end in finding.gaps],
+        "excluded": [] if rejected else [[*ends] for ends in finding.gaps],
         "deviation": finding.deviation,
-        "provided": finding.quantity.provided,
-        "in_words": f"fit rejected: the best fit, {best}, is not to be used"
-        if rejected
-        else finding.words(),
+        "provided": quantity.provided,
+        "in_words": no_use if rejected else finding.words(),
         "profile": {
-            "values": [float(value) for value in np.exp(profile.log_values)],
-            "increases": [round_increase(float(increase)) for increase in profile.increases],
+            "values": np.exp(finding.log_values).tolist(),
+            "increases": [round_increase(increase) for increase in finding.increases.tolist()],
         },
     }
 
@@ -107,9 +103,8 @@ def trace_data(diagnosis: Diagnosis) -> dict[str, Any]:
 
 def _spread_s(recording: Recording, experiment: Experiment) -> tuple[float, float]:
     """Return the first interval and the duration, or inverse frequencies of a sweep."""
-    first_s, last_s = experiment.torque.spread_s(recording.time_s)
+    time_s, (first_s, last_s) = recording.time_s, experiment.torque.spread_s(recording.time_s)
     if not experiment.instrument.sweeps:
-        time_s = recording.time_s
         first_s = float(np.diff(time_s)[np.searchsorted(time_s[:-2], 0.0)])
     return first_s, last_s
 
@@ -134,25 +129,21 @@ def _fixed(experiment: Experiment) -> dict[str, list[str]]:
 
 def _what_limits_include(experiment: Experiment) -> str:
     """Return a sentence on the part that uncertainties of gripper and protocol have in limits."""
-    instrument, controlled = experiment.instrument, experiment.instrument.controlled.name
-    exact = "gripper" if instrument.has_jaws else controlled
+    jaws, controlled = experiment.instrument.has_jaws, experiment.instrument.controlled.name
+    exact = f"otherwise the {'gripper' if jaws else controlled} is taken as exact."
     known = [(part, key) for part, key, _ in experiment.uncertain if not part.endswith("steps")]
     keys = [f"{part}.{key}".removesuffix(".share") for part, key in known]
-    said = []
-    if instrument.has_jaws and keys:
+    said, allowed = [], []
+    if jaws and keys:
         said.append(f"Limits include uncertainties of the gripper: {', '.join(keys)}.")
-    steps, allowed = len(experiment.uncertainty.get("steps", {})), []
-    if steps:
-        allowed.append(
-            f"{counted(steps, 'step')} of the {controlled} anywhere between the two rows of its "
-            "record"
-        )
+    if steps := len(experiment.uncertainty.get("steps", {})):
+        between = f"of the {controlled} anywhere between the two rows of its record"
+        allowed.append(f"{counted(steps, 'step')} {between}")
     if experiment.load_errors is not None:
         allowed.append(f"what is left of noise in the record of the {controlled}")
     if allowed:
-        text = f"Limits allow for {' and for '.join(allowed)}"
-        said.append(f"{text}; otherwise the {exact} is taken as exact.")
-    return " ".join(said) or f"Limits are statistical only: the {exact} is taken as exact."
+        said.append(f"Limits allow for {' and for '.join(allowed)}; {exact}")
+    return " ".join(said) or f"Limits are statistical only: {exact.removeprefix('otherwise ')}"
 
 
 def _fitted_along(
@@ -169,7 +160,7 @@ def _fitted_along(
 
         value, *limits = depth_limits(diagnosis)
         found |= {"contact_m": value, "contact_limits_m": limits}
-    if not (experiment.offset or experiment.drift):
+    if not experiment.offset_and_drift:
         return found
     time_s, measured = recording.time_s, recording.readings
     network = experiment.searched.network(np.exp(diagnosis.likelihood.best))

@@ -64,13 +64,12 @@ def without_noise(experiment: Experiment, recording: Recording) -> tuple[Experim
     if not np.any(left):
         return experiment, recording
     smooth = np.column_stack((experiment.record[:, 0], values))
-    records, count = (experiment.record, smooth), min(len(recording.time_s), _MOST_READINGS)
-    rest = _left(experiment, records, recording.time_s, recording.readings)
-    if rest[0] <= rest[1] * np.exp(levels.SMOOTHED / count):
+    both, count = [experiment, replace(experiment, record=smooth)], len(recording.time_s)
+    rest = left_by_any(both, recording.time_s, recording.readings)
+    if rest[0] <= rest[1] * np.exp(levels.SMOOTHED / min(count, _MOST_READINGS)):
         return experiment, recording
     noise = float(np.std(left) / np.max(np.abs(experiment.record[:, 1])))
-    experiment = replace(experiment, record=smooth, load_errors=errors)
-    return experiment, replace(recording, load_noise=noise)
+    return replace(both[1], load_errors=errors), replace(recording, load_noise=noise)
 
 
 def with_its_steps(experiment: Experiment, recording: Recording) -> tuple[Experiment, Recording]:
@@ -86,8 +85,9 @@ def with_its_steps(experiment: Experiment, recording: Recording) -> tuple[Experi
     if step and extent > levels.FEWEST_STEPS * step:
         other, other_s = with_steps(experiment.record, levels.ONE_STEP * step)
         smooth = np.column_stack((other[:, 0], smoothed(other[:, 1])[0]))
-        given = recording.time_s - (recording.read.start_s or 0.0), recording.readings
-        rest = _left(experiment, (record, smooth), *given)
+        both = [replace(experiment, record=course) for course in (record, smooth)]
+        time_s = recording.time_s - (recording.read.start_s or 0.0)
+        rest = left_by_any(both, time_s, recording.readings)
         if rest[1] < rest[0]:
             record, uncertain_s = other, other_s
     steps = {str(number): error for number, error in enumerate(uncertain_s.tolist())}
@@ -117,31 +117,28 @@ def tare_of(experiment: Experiment, recording: Recording) -> float:
         return 0.0
     same = np.abs(load[:, 1] - load[0, 1]) < levels.HELD * np.ptp(load[:, 1])
     first = load[: int(np.argmin(same)), 1]
-    if len(first) < levels.FEWEST_BEFORE or abs(tare := float(np.median(first))) <= np.std(first):
+    few = len(first) < levels.FEWEST_BEFORE
+    if few or abs(tare := float(np.median(first))) <= np.std(first) or not is_still(first):
         return 0.0
-    if not is_still(first):
-        return 0.0
-    given = (record, record - (0.0, tare)), recording.time_s - start_s, recording.readings
+    given = recording.time_s - start_s, recording.readings
     level = chdtri(1, levels.SURELY) / min(len(load), _MOST_READINGS)
-    rest = _left(replace(experiment, offset=True), *given)
+    both = [experiment, replace(experiment, record=record - (0.0, tare))]
+    rest = left_by_any([replace(each, offset=True) for each in both], *given)
     if rest[0] <= rest[1] * np.exp(level if load[0, 0] >= start_s else -level):
         return 0.0
-    rest = _left(experiment, *given)
+    rest = left_by_any(both, *given)
     return tare if rest[1] < rest[0] * np.exp(level) else 0.0
 
 
-def _left(
-    experiment: Experiment, records: Sequence[Array], time_s: Array, readings: Array
-) -> list[float]:
-    """Return the mean square that any sample leaves under each record."""
+def left_by_any(experiments: Sequence[Experiment], time_s: Array, readings: Array) -> list[float]:
+    """Return the mean square that any sample leaves of readings, for each of several loads."""
     some = np.unique(np.linspace(0, len(time_s) - 1, _MOST_READINGS).astype(np.int64))
-    lags = spread_lags(experiment.torque, time_s, _LAGS_A_DECADE)
-    nuisance, rest = experiment.nuisance(time_s[some]), []
-    for record in records:
-        posed = replace(experiment, record=record)
-        responses = without(nuisance, lag_course(posed.torque, lags, time_s[some]))
-        rest.append(fit_responses(without(nuisance, readings[some]), responses)[1])
-    return rest
+    lags = spread_lags(experiments[0].torque, time_s, _LAGS_A_DECADE)
+    nuisance, left = experiments[0].nuisance(time_s[some]), []
+    for experiment in experiments:
+        responses = without(nuisance, lag_course(experiment.torque, lags, time_s[some]))
+        left.append(fit_responses(without(nuisance, readings[some]), responses)[1])
+    return left
 
 
 def smoothed(values: Array) -> tuple[Array, Array]:
@@ -237,7 +234,6 @@ def _parted(values: Array) -> list[int]:
     thinned = 1 + len(values) // _MOST_READINGS
     rows = values[::thinned]
     low, high = _PART, len(rows) - _PART
-
     if low >= high:
         return []
     most = _Stretch(rows).cross_validation() - _BETTER

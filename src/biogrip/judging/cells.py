@@ -32,7 +32,7 @@ from scipy.special import ndtri, stdtr, stdtrit
 from biogrip.arrays import Array
 from biogrip.judging.censored import ABOVE, BELOW, KNOWN, censored_mean, pseudo_values
 from biogrip.judging.doubts import OK
-from biogrip.judging.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, FIT_REJECTED
+from biogrip.judging.profiles import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, FIT_REJECTED
 
 FEWEST_CELLS, FEWEST_UNITS, FEWEST_PAIRS = 3, 3, 2
 """Fewest cells of which a mean is estimated, and fewest units, or pairs of them, for p."""

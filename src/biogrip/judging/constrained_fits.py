@@ -16,10 +16,8 @@ from dataclasses import replace
 import numpy as np
 
 from biogrip.arrays import Array, BoolArray, IntArray
-from biogrip.fit.least_squares import LocalFits
-from biogrip.fit.levenberg_marquardt import Minima, Normal
-from biogrip.judging.likelihood import Likelihood
-from biogrip.judging.quantities import Quantity
+from biogrip.fit.least_squares import LocalFits, Minima, Normal
+from biogrip.judging.likelihood import Likelihood, Quantity
 
 # E-folds from a bound at which a member counts as free, and by which rounding may exceed it.
 _FREE_OF_BOUND, _BEYOND_BOUND = 1e-9, 1e-7
@@ -239,17 +237,6 @@ class ConstrainedFits:
         increases, x = self.at(np.tile(profile, count), np.tile(targets, count), near, tolerance)
         increases = increases.reshape(count, -1)
         return increases, x.reshape(starts.shape)[np.argmin(increases, axis=0), range(len(profile))]
-
-    def with_fixed(self, x: Array, fixed: BoolArray, tolerance: float) -> tuple[Array, Array]:
-        """Fit the first trace with some parameters fixed; tolerance and results are as in `at`.
-
-        Starts are log-parameters, (n, n_parameters); the mask is true, (n_parameters,), for those
-        fixed at their start, within the search range or not.
-        """
-        trace = np.zeros(len(x), dtype=np.int64)
-        low, high = (np.where(fixed, x, end[0]) for end in (self._fits.low, self._fits.high))
-        minima = self._fits.fitted(x, trace, tolerance, low=low, high=high)
-        return self._increases(minima, trace), minima.x
 
     def _increases(self, minima: Minima, trace: IntArray) -> Array:
         excess = minima.misfit**2 - self._misfit[trace] ** 2

@@ -21,7 +21,7 @@ import biogrip.levels as levels
 from biogrip.arrays import Array
 from biogrip.digits import plain
 from biogrip.fit.experiment import Experiment
-from biogrip.fit.least_squares import fit_from
+from biogrip.fit.least_squares import fit_from, refit
 from biogrip.fit.nested_fits import FittedModels
 from biogrip.fit.problem import Fit, TraceProblem
 from biogrip.fit.trace_fit import TraceFit
@@ -31,19 +31,23 @@ from biogrip.judging.doubts import (
     REJECTED,
     REJECTION,
     RING,
-    ROUNDED,
     FindNotes,
     Note,
     compute_status,
     examine_residuals,
 )
-from biogrip.judging.likelihood import Likelihood, check_rows, make_likelihood
-from biogrip.judging.quantities import characteristic_times, parameters_and_sum
-from biogrip.judging.verdicts import DETERMINED, Finding, Trade, compute_findings, find_trade_offs
+from biogrip.judging.likelihood import (
+    Likelihood,
+    characteristic_times,
+    check_rows,
+    make_likelihood,
+    parameters_and_sum,
+)
+from biogrip.judging.profiles import DETERMINED, Finding, Trade, compute_findings, find_trade_offs
 from biogrip.judging.what_moves import Move, find_moves
 from biogrip.judging.without_model import KINDS, WithoutModel, tell_without_model, times_told
+from biogrip.physics.response import Grip
 from biogrip.physics.sample_model import C_P
-from biogrip.physics.simulation import Grip
 from biogrip.traces.reader import Recording
 
 # Widening of a range, and the start beyond its end, in e-folds; and rounding.
@@ -197,14 +201,14 @@ def lower_fit(judged: Diagnosis, fit: Fit) -> Fit | None:
     exact = levels.EXACT * judged.likelihood.problem.residuals.peak
     if judged.lowest is None or fit.misfit < exact:
         return None
-    missed = fit.at(fit_from([judged.likelihood.problem], judged.lowest))
+    missed = refit(fit, judged.likelihood.problem, judged.lowest)
     return None if judged.likelihood.increase(missed.misfit) > -levels.MISSED else missed
 
 
 def profiled(likelihood: Likelihood, findings: list[Finding], trades: list[Trade]) -> Diagnosis:
     """Return a diagnosis without notes, with the lowest point of its profiles."""
     every = [*findings, *(trade.finding for trade in trades)]
-    lowest = min((finding.profile for finding in every), key=lambda p: float(p.increases.min()))
+    lowest = min(every, key=lambda finding: float(finding.increases.min()))
     missed = lowest.lowest if lowest.increases.min() < -levels.MISSED else None
     return Diagnosis(likelihood, findings, trades, lowest=missed)
 
@@ -249,9 +253,6 @@ def with_notes(judged: Diagnosis, of_rest: list[Note]) -> Diagnosis:
         if finding.gaps
     ]
     notes += [*_range_ends(likelihood), *of_rest]
-    # Limits that allow for rounding hold, however wide they are.
-    if not any(note.about == ROUNDED for note in of_rest):
-        notes += _too_slow(judged)
     notes += _pulling(grip, residuals.duration_s)
     if not judged.converged:
         text = (
@@ -261,17 +262,6 @@ def with_notes(judged: Diagnosis, of_rest: list[Note]) -> Diagnosis:
         notes.append(Note(DOUBT, text))
     notes += _ringing(judged, rejected=compute_status(notes) == REJECTED)
     return replace(judged, grip=grip, notes=notes)
-
-
-def _too_slow(judged: Diagnosis) -> Iterator[Note]:
-    """Yield a note if limits that allow for a misfit as slow as the trace are too wide."""
-    wide = any(finding.verdict == DETERMINED and finding.is_wide for finding in judged.findings)
-    if judged.likelihood.independent < 1 and wide:
-        yield Note(
-            REJECTION,
-            "What the fit leaves is as slow as the trace, and limits that allow for it tell hardly "
-            "more than an order of magnitude: what the trace determines cannot be judged.",
-        )
 
 
 def _range_ends(likelihood: Likelihood) -> Iterator[Note]:

@@ -6,11 +6,10 @@ Residuals are tested for white noise (`biogrip.judging.whiteness`), each test at
 with the rotation is told first, and the other tests are of what it leaves.
 
 What is correlated beyond chance (`CERTAIN_MISFIT`) and larger than the scatter of neighbouring
-readings may be noise all the same: if it is correlated for a short time (`has_fast_noise`), or if
-it differs from one part of the trace to another (`has_uneven_noise`). Else it is misfit. A misfit
-of 2 % of the peak or more rejects the fit. With a smaller one limits count independent residuals
-only: the fit is good to so much of the peak, which is doubtful, not wrong. A noise model that is
-correlated for too long may be misfit, too (`find_slow_misfit`).
+readings may be noise all the same, if it is correlated for a short time (`has_fast_noise`). Else it
+is misfit. A misfit of 2 % of the peak or more rejects the fit. With a smaller one limits count
+independent residuals only: the fit is good to so much of the peak, which is doubtful, not wrong. A
+noise model that is correlated for too long may be misfit, too (`find_slow_misfit`).
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -24,7 +23,8 @@ import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray
 from biogrip.digits import counted, p_value, plain
 from biogrip.fit.any_sample import fit_any_sample
-from biogrip.fit.noise_model_fit import (
+from biogrip.fit.trace_noise import (
+    NoiseModel,
     NoiseModelLikelihood,
     absorbed,
     compare_extremes,
@@ -33,7 +33,7 @@ from biogrip.fit.noise_model_fit import (
 )
 from biogrip.judging import whiteness
 from biogrip.judging.likelihood import Likelihood
-from biogrip.physics.noise import MOST_SAMPLES, ROOT_12, NoiseModel, estimate_noise, without
+from biogrip.physics.noise import MOST_SAMPLES, ROOT_12, estimate_noise, without
 from biogrip.physics.residuals import Residuals
 
 HARMLESS, DOUBT, REJECTION = "harmless", "doubt", "rejection"
@@ -208,9 +208,6 @@ def _find_notes(left: _Left, misfit: Note | None = None) -> list[Note]:
     # Outliers distort a fit, so that all that it leaves is correlated.
     if not left.struck.any():
         colour = list(_about_colour(left))
-        if not in_time:
-            # Nothing has a spectrum, or wanders, over places of two moduli.
-            colour = colour[: left.correlation[1] < levels.FALSE_ALARM]
         changes = _about_changes(left, coloured=bool(colour))
         # The misfit is said once.
         doubts += left.lines or changes[-1:] if misfit else left.lines or changes or colour
@@ -236,13 +233,6 @@ def _find_notes_of_rounding(left: _Left, misfit: Note | None = None) -> list[Not
 def _misfit(left: _Left, residual: Array, slopes: Array) -> tuple[Note, tuple[float, float] | None]:
     """Return the note on a misfit, and its worth and freedom if limits allow for it."""
     residuals, times, scale = left.likelihood.problem.residuals, left.times, left.scale
-    if has_uneven_noise(residual, residuals.trace.rounding):
-        text = (
-            "The noise differs from one part of the trace to another, and the intervals do not "
-            "allow for that: leave out the readings that scatter most (--from, --until), or give "
-            "standard deviations (--sd)."
-        )
-        return Note(DOUBT, text), None
     more = plain(times, 2)
     share = scale * float(np.sqrt(times**2 - 1)) / residuals.peak
     relative = residuals.course.sweeps and residuals.coloured
@@ -278,10 +268,8 @@ def name_suspects(residuals: Residuals, times: float, scale: float) -> str:
     fit = fit_any_sample(residuals)
     other, left = fit.sd / scale, fit.left_of_readings()
     least = plain(other, 2)
-    gives, culprits = (
-        "gives this trace under this protocol",
-        "load, clock, contact, drift, or a sample that is not linear",
-    )
+    gives = "gives this trace under this protocol"
+    culprits = "load, clock, contact, drift, or a sample that is not linear"
     if residuals.course.sweeps:
         gives = "has both moduli (Kramers-Kronig)"
         _, culprits = whiteness.find_inertia(residuals, *left)
@@ -326,12 +314,9 @@ def _about_colour(left: _Left) -> Iterator[str]:
             f"Neighbouring residuals are correlated ({correlation:.2f}; white noise would give "
             f"0 ± {1 / np.sqrt(len(residual)):.2f}): the intervals are too narrow, or {suspects()}."
         )
-    elif (chance := whiteness.uneven(residual, basis)) < levels.FALSE_ALARM:
-        yield (
-            "The residual has more of some frequencies than of others, unlike white noise "
-            f"({p_value(chance)}): the intervals are wrong, or {suspects()}."
-        )
-    chance = whiteness.wandering(residual, basis)
+    # Nothing wanders over places of two moduli.
+    sweeps = left.likelihood.problem.residuals.course.sweeps
+    chance = 1.0 if sweeps else whiteness.wandering(residual, basis)
     if chance < levels.FALSE_ALARM:
         yield (
             "The residual wanders: its means over stretches of the trace scatter more than those "
@@ -345,7 +330,8 @@ def _about_changes(left: _Left, *, coloured: bool) -> list[str]:
     residuals, residual, basis = left.likelihood.problem.residuals, left.bulk, left.basis
     trace, growth = residuals.trace, left.growth
     if residuals.course.sweeps:
-        return [] if coloured else list(whiteness.about_moduli(residuals, residual, basis, growth))
+        is_inertia, cause = whiteness.find_inertia(residuals, residual, basis, growth)
+        return [f"The fit leaves what is of {cause}."] if is_inertia and not coloured else []
     step = whiteness.find_step(residual, basis, lambda it: trace.condensed.cleared(it) / growth)
     if step and step.chance < levels.FALSE_ALARM and not (coloured and _is_coloured(step)):
         before_s, after_s = trace.time_s[step.before - 1 : step.before + 1]
@@ -376,8 +362,8 @@ def _about_changes(left: _Left, *, coloured: bool) -> list[str]:
 def _is_coloured(step: whiteness.Step) -> bool:
     """Return True if what a fit leaves with a step is not white noise, either."""
     given = step.left, step.basis
-    chances = whiteness.correlated(*given)[1], whiteness.uneven(*given), whiteness.wandering(*given)
-    return min(chances) < levels.FALSE_ALARM
+    chance = min(whiteness.correlated(*given)[1], whiteness.wandering(*given))
+    return chance < levels.FALSE_ALARM
 
 
 def middle_of(residuals: Residuals) -> int:
@@ -395,14 +381,9 @@ def _about_outliers(residuals: Residuals, struck: BoolArray) -> Iterator[str]:
         named = ", ".join(map(residuals.course.place, far[:_NAMED]))
         more = f" and {len(far) - _NAMED} more" if len(far) > _NAMED else ""
         of = "" if residuals.course.sweeps else " of the protocol"
-        at_step = (
-            " Readings at the very instant of a step may be of either side of it: leave them out."
-            if np.isin(far, residuals.course.steps_s).any()
-            else ""
-        )
         yield (
             f"{counted(len(far), 'outlier')}, at {named}{more}{of}: too far from the fit for the "
-            f"noise of the others. Outliers distort the fit.{at_step}"
+            f"noise of the others. Outliers distort the fit."
         )
 
 
@@ -416,26 +397,21 @@ def _about_given(likelihood: Likelihood, residual: Array) -> Iterator[Note]:
     chi_squared = float(residual @ residual) / likelihood.noise_sd**2
     share = float(np.sqrt(chi_squared / left))
     if share < levels.TOO_LITTLE and float(chdtr(left, chi_squared)) < levels.FALSE_ALARM:
-        yield Note(
-            DOUBT,
-            f"The noise that was given is {plain(1 / share, 2)} times what the fit leaves: its "
-            "value, or its unit, is not the right one.",
-        )
-    if share > 1 and float(chdtrc(left, chi_squared)) < levels.FALSE_ALARM:
-        much, so = share > levels.TOO_MUCH, "limits are too narrow by that"
-        if much:
+        weight, so = DOUBT, "its value or unit is not the right one"
+    elif share > 1 and float(chdtrc(left, chi_squared)) < levels.FALSE_ALARM:
+        weight, so = HARMLESS, "limits are too narrow by that"
+        if share > levels.TOO_MUCH:
             suspects = name_suspects(residuals, share, likelihood.noise_sd)
-            so = f"its value or unit is not the right one, or {suspects}"
-        yield Note(
-            DOUBT if much else HARMLESS,
-            f"What the fit leaves is {plain(share, 3)} times the noise that was given: {so}.",
-        )
+            weight, so = DOUBT, f"its value or unit is not the right one, or {suspects}"
+    else:
+        return
+    yield Note(
+        weight, f"What the fit leaves is {plain(share, 3)} times the noise that was given: {so}."
+    )
 
 
 # Stretches of `IN_ONE_STRETCH`.
 _SLOW_STRETCHES = 20
-# Of stretches with fewer readings the scatter is hardly known.
-_IN_A_STRETCH, _FEWEST_STRETCHES = 50, 3
 
 
 def find_slow_misfit(
@@ -489,20 +465,3 @@ def has_fast_noise(residuals: Residuals, residual: Array, slopes: Array) -> bool
     scatter = np.sqrt(np.mean(residual**2)) / max(residuals.noise_scale, 1e-300)
     rough = scatter < levels.SMOOTH * np.sqrt(max(levels.SLOW * len(time_s), 1.0))
     return fast and bool(rough) and noise_model.ar1 > levels.NOTICEABLE
-
-
-def has_uneven_noise(residual: Array, rounding: float) -> bool:
-    """Return True if what a fit leaves, (n_samples,), is as large as a scatter that differs.
-
-    So it is where an instrument averages for longer and longer, or settles at first. A misfit of
-    the model is smooth, and larger than the scatter of neighbours wherever it is.
-    """
-    count = min(_SLOW_STRETCHES, len(residual) // _IN_A_STRETCH)
-    if count < _FEWEST_STRETCHES:
-        return False
-    stretches = np.array_split(residual, count)
-    scales = [estimate_noise(each, rounding) for each in stretches]
-    if max(scales) < levels.UNEVEN * min(scales):
-        return False
-    own = np.concatenate([each / scale for each, scale in zip(stretches, scales, strict=True)])
-    return bool(np.mean(own**2) < levels.AS_THE_SCATTER)

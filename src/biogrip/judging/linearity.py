@@ -13,7 +13,7 @@ from scipy.special import fdtrc, stdtrit
 import biogrip.levels as levels
 from biogrip.arrays import Array
 from biogrip.digits import p_value, plain, with_limits
-from biogrip.fit.noise_model_fit import absorbed
+from biogrip.fit.trace_noise import absorbed
 from biogrip.judging.doubts import DOUBT, MANY, REJECTED, REJECTION, Note, compute_status
 from biogrip.judging.likelihood import Likelihood
 from biogrip.physics.noise import without
@@ -61,11 +61,10 @@ def notes_on_gains(likelihood: Likelihood, notes: list[Note]) -> Iterator[Note]:
     held = held_levels(residuals.course)
     if not 1 < len(held) <= _MOST_LEVELS:
         return
-    courses, confidence = [course for _, course in held], likelihood.confidence
-    *_, chance = _more(residuals, likelihood.best, courses, confidence)
-    if chance >= levels.FALSE_ALARM:
+    found = _gains(likelihood, [replace(residuals, course=course) for _, course in held[1:]])
+    if found is None:
         return
-    gains, errors = _gains(likelihood, courses)
+    gains, errors, chance = found
     instrument = residuals.instrument
     unit = f" {instrument.controlled.unit}".rstrip()
     said = " and ".join(
@@ -80,55 +79,37 @@ def notes_on_gains(likelihood: Likelihood, notes: list[Note]) -> Iterator[Note]:
     )
 
 
-def _gains(likelihood: Likelihood, courses: list[Course]) -> tuple[Array, Array]:
-    """Fit gains over that of the first level, (n_levels - 1,), and half widths of their limits.
+def _gains(
+    likelihood: Likelihood, levels_alone: list[Residuals]
+) -> tuple[Array, Array, float] | None:
+    """Fit gains over that of the first level, and the sample along, by steps of Gauss-Newton.
 
-    A gain of what is read is one of the load: by steps of Gauss-Newton, loads are scaled, and with
-    them the sample is fitted.
+    Returns the gains, (n_levels - 1,), half widths of their limits, and the chance of as much if
+    the sample is linear; None if it may be.
     """
     residuals, best = likelihood.problem.residuals, likelihood.best.copy()
-    gains, given = np.ones(len(courses) - 1), residuals.course
-    for _ in range(_STEPS):
+    condensed, gains, chance = residuals.trace.condensed, np.ones(len(levels_alone)), 1.0
+    for step in range(_STEPS):
         left, slopes = residuals(best)
-        shown = [replace(residuals, course=course).response(best) for course in courses[1:]]
-        cleared = residuals.trace.condensed.cleared(np.array(shown))
-        step = np.linalg.lstsq(np.vstack((slopes, cleared)).T, -left)[0]
-        best += np.clip(step[: len(best)], -1.0, 1.0)
-        more = 1 + np.clip(step[len(best) :], -0.5, 0.5)
-        gains *= more
-        scaled = [course.times(by) for course, by in zip(courses[1:], more, strict=True)]
-        added = [course.times(1 - 1 / by) for course, by in zip(scaled, more, strict=True)]
-        courses, given = [courses[0], *scaled], _sum([given, *added])
-        residuals = residuals.under(given)
-    _, errors, _ = _more(residuals, best, courses, likelihood.confidence)
-    return gains, gains * errors
-
-
-def _sum(courses: list[Course]) -> Course:
-    """Return the protocol that controls what several control together."""
-    orders = max(own.changes.shape[1] for own in courses)
-    changes = [np.pad(own.changes, ((0, 0), (0, orders - own.changes.shape[1]))) for own in courses]
-    starts_s = np.concatenate([own.time_s for own in courses])
-    first = courses[0]
-    return superposed(starts_s, np.vstack(changes), first.end_s, deforms=first.deforms)
-
-
-def _more(
-    residuals: Residuals, best: Array, courses: list[Course], confidence: float
-) -> tuple[Array, Array, float]:
-    """Return gains over that of the first level, to first order, half widths, and their chance."""
-    left, slopes = residuals(best)
-    shown = [replace(residuals, course=course).response(best) for course in courses[1:]]
-    cleared = residuals.trace.condensed.cleared(np.array(shown))
-    basis = absorbed(np.vstack((slopes, residuals.trace.condensed.taken)))
-    alone, rest = without(basis, cleared), without(basis, left)
-    free = len(rest) - len(basis) - len(alone)
-    if free < 1:
-        return np.ones(len(alone)), np.zeros(len(alone)), 1.0
-    more = np.asarray(np.linalg.lstsq(alone.T, -rest)[0], np.float64)
-    after = rest + more @ alone
-    square = float(after @ after) / free
-    chance = fdtrc(len(alone), free, float(rest @ rest - after @ after) / len(alone) / square)
-    room = stdtrit(free, 0.5 + confidence / 2)
+        shown = condensed.cleared(np.array([level.simulated(best) for level in levels_alone]))
+        left = left + (gains - 1) @ shown[:, 0]
+        slopes = slopes + np.tensordot(gains - 1, shown[:, 1:], 1)
+        basis = absorbed(np.vstack((slopes, condensed.taken)))
+        alone, rest = without(basis, shown[:, 0]), without(basis, left)
+        free = len(rest) - len(basis) - len(alone)
+        if free < 1:
+            return None
+        more = np.asarray(np.linalg.lstsq(alone.T, -rest)[0], np.float64)
+        after = rest + more @ alone
+        square = float(after @ after) / free
+        if not step:
+            explained = float(rest @ rest - after @ after)
+            chance = float(fdtrc(len(alone), free, explained / len(alone) / square))
+            if chance >= levels.FALSE_ALARM:
+                return None
+        more = np.clip(more, -0.5, 0.5)
+        gains += more
+        best += np.clip(np.linalg.lstsq(slopes.T, -left - more @ shown[:, 0])[0], -1.0, 1.0)
+    room = stdtrit(free, 0.5 + likelihood.confidence / 2)
     errors = room * np.sqrt(square * np.diagonal(np.linalg.pinv(alone @ alone.T)))
-    return 1 + more, errors, float(chance)
+    return gains, errors, chance

@@ -28,16 +28,17 @@ from biogrip.digits import instant, plain
 from biogrip.fit.any_sample import fit_any_sample, fit_responses, spread_lags
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.least_squares import LeastSquaresSettings, fit_from, identify_many
-from biogrip.fit.noise_model_fit import absorbed
 from biogrip.fit.problem import TraceProblem, silent
+from biogrip.fit.trace_noise import absorbed
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.judging.doubts import DOUBT, HARMLESS, MANY, REJECTED, REJECTION, RING, Note
 from biogrip.judging.likelihood import Likelihood, compute_fall, make_likelihood
-from biogrip.judging.profiles import Profile, compute_profiles
-from biogrip.judging.verdicts import Finding
+from biogrip.judging.profiles import Finding, compute_findings
 from biogrip.physics.modes import lag_course
 from biogrip.physics.noise import estimate_noise, nuisance_basis, without
-from biogrip.physics.protocol import ramp, spacing_at
+from biogrip.physics.protocol import evaluate, spacing_at
+from biogrip.physics.residuals import Residuals
+from biogrip.traces.reader import Recording
 
 _LAGS_A_DECADE = 2
 # Delays on the first grid; finer ones have as many between the neighbours of the best.
@@ -155,14 +156,6 @@ class OnsetFits:
         fit = fit_from([self.posed(onset_s)], near)
         return OnsetFit(onset_s, fit.x[0], float(fit.misfit[0]))
 
-    def given(self, likelihood: Likelihood) -> OnsetFit:
-        """Return the fit for an onset at 0: that of a likelihood if it is in white noise, too."""
-        own, best = likelihood.problem.residuals, likelihood.best
-        projected = self.posed(0.0).residuals.trace.condensed.nuisance
-        if own.coloured or not np.array_equal(own.trace.condensed.nuisance, projected):
-            return self.at(0.0, best)
-        return OnsetFit(0.0, best, likelihood.misfit)
-
     @cached_property
     def _latest_s(self) -> float:
         """Latest onset, which leaves readings enough to fit the sample."""
@@ -204,13 +197,8 @@ class OnsetFits:
         # Imported here: loading it takes longer than a short job.
         from scipy.optimize import least_squares
 
-        low, high = (
-            np.append(ends, onset_s)
-            for ends, onset_s in (
-                (problem.low, low_s + inside_s),
-                (problem.high, high_s - inside_s),
-            )
-        )
+        low = np.append(problem.low, low_s + inside_s)
+        high = np.append(problem.high, high_s - inside_s)
 
         def of(x: Array) -> Array:
             return self.posed(x[-1]).residuals.left(x[:-1]) / size
@@ -240,62 +228,59 @@ class OnsetFits:
         yield from pairwise(edges[max(after - _NEAR, 0) : after + _NEAR].tolist())
 
 
-# Starts from 0 to the first reading that are tried for a better one.
-_BETWEEN = 5
-# Starts that are compared, the last so much of an interval before the first reading.
-_STARTS, _NEAREST = 40, 0.01
+# Starts within the limits of a fitted one, from it, over these: as on a circle.
 _SHARES = np.sin(np.pi * np.arange(1, 3) / 6)
 # First change of the onset over how far readings are apart there, and most of it as a share of the
 # trace.
 _FIRST_STEP, _MOST = 1 / 64, 0.25
 # Start that is earlier by so much of an interval, for differences.
 _EARLIER = 0.1
-# Newton steps that move a load along the clock, and by how many readings at most; share of squares
-# of what moves that is rounding.
-_STEPS_OF_CLOCK, _MOST_ROWS, _TOLD = 3, 3.0, 1e-6
+# Most readings by which a load is moved along the clock, and accuracy of that; share of squares of
+# what moves that is rounding.
+_MOST_ROWS, _ACCURACY_OF_CLOCK, _TOLD = 4.0, 0.01, 1e-6
 # Accuracy of an end of the onset's interval, as a share of its distance.
 _ACCURACY = 0.02
 
 
 def notes_on_start(
-    experiment: Experiment,
-    time_s: Array,
-    readings: Array,
-    diagnosis: Diagnosis,
+    recording: Recording, experiment: Experiment, diagnosis: Diagnosis
 ) -> list[Note]:
     """Return notes on another start of the protocol than at 0, and on a ramp.
 
     A trace that begins constant, and fits far better with a later start, tells nothing of the
     sample under the protocol as given, whatever noise model absorbs the misfit: the test is a
-    likelihood ratio. One that begins as if cut off there may be on another clock. Times ascend,
-    (n_samples,), and the diagnosis is that of the best fit with a start at 0.
+    likelihood ratio. One that begins as if cut off there may be on another clock. The diagnosis is
+    that of the best fit with a start at 0.
     """
-    may_be_late = not experiment.start_given
-    fits, ramped = OnsetFits(experiment, time_s, readings), _with_ramp(experiment, time_s)
-    notes: list[Note] = []
-    if may_be_late and ramped and is_cut_off(time_s):
-        notes += _about_clock(fits, diagnosis)
-    elif may_be_late and begins_constant(time_s, readings):
-        # A constant that is not zero is an offset, with which the onset would be biased.
-        free, onset_s = (
-            replace(experiment, offset=True),
-            estimate_onset(experiment, time_s, readings),
+    time_s, readings = recording.time_s, recording.readings
+    given, notes = experiment.start_given, list[Note]()
+    ramped = _with_ramp(diagnosis.likelihood.problem.residuals)
+    if not given and ramped and recording.read.from_s is None and is_cut_off(time_s):
+        text = (
+            f"The readings begin {plain(time_s[0])} s after the step of the protocol, as if on the "
+            "clock of something longer: values hang on when it came. Say when the protocol started "
+            "(--start, measurement.start_s), be it at 0, or what came before (--config, protocol)."
         )
+        notes.append(Note(DOUBT, text))
+    elif not given and begins_constant(time_s, readings):
+        # A constant that is not zero is an offset, with which the onset would be biased.
+        free = replace(experiment, offset=True)
+        onset_s = estimate_onset(experiment, time_s, readings)
         if begins_constant(time_s, readings, onset_s):
-            notes += _about_late_onset(replace(fits, experiment=free), diagnosis, onset_s)
+            notes += _about_late_onset(OnsetFits(free, time_s, readings), diagnosis, onset_s)
     if diagnosis.status != REJECTED and ramped and not notes:
-        notes += _about_ramp(fits, diagnosis, ramped)
+        notes += _about_ramp(diagnosis, ramped, recorded=experiment.record is not None)
     smooth = experiment.record is not None and not experiment.uncertainty.get("steps")
     smooth &= experiment.load_errors is None
     if smooth and not experiment.coloured and len(time_s) <= MANY:
-        notes += _about_load(fits, diagnosis)
+        notes += _about_load(diagnosis)
     return notes
 
 
 def _about_late_onset(fits: OnsetFits, diagnosis: Diagnosis, guess_s: float) -> Iterator[Note]:
     """Yield a note if a trace is constant up to an onset, with which it fits far better."""
     trace, noise_sd = (fits.time_s, fits.readings), fits.experiment.noise_sd
-    given, needed = fits.given(diagnosis.likelihood), chdtri(1, levels.SURELY)
+    given, needed = fits.at(0.0, diagnosis.likelihood.best), chdtri(1, levels.SURELY)
     fall_to = partial(compute_fall, len(trace[0]), given.misfit, noise_sd=noise_sd)
     # Fitted along, a start cannot gain more than any sample, but for what moving it a little does.
     of_any_sample = fit_any_sample(fits.posed(guess_s).residuals).misfit
@@ -318,40 +303,37 @@ def _about_late_onset(fits: OnsetFits, diagnosis: Diagnosis, guess_s: float) -> 
     )
 
 
-def _about_load(fits: OnsetFits, diagnosis: Diagnosis) -> Iterator[Note]:
-    """Yield a note if a recorded load that comes earlier or later, by Newton steps, fits better."""
-    given = other = fits.given(diagnosis.likelihood)
-    needed, spacing_s = chdtri(1, levels.FALSE_ALARM), spacing_at(fits.time_s, 0.0)
-    for _ in range(_STEPS_OF_CLOCK):
-        starts_s = other.onset_s, other.onset_s + _EARLIER * spacing_s
-        here, later = (fits.posed(start_s).residuals for start_s in starts_s)
-        residual, slopes = here(other.log_parameters)
-        basis = absorbed(np.vstack((slopes, here.trace.condensed.taken)))
-        change = later.left(other.log_parameters) - residual
-        moved = without(basis, change)
-        told = float(moved @ moved)
-        if told <= _TOLD * float(change @ change):
-            return
-        step = -float(moved @ residual) / told
-        if other is given and step**2 * told < needed * given.misfit**2:
-            return
-        late_s = other.onset_s + step * _EARLIER * spacing_s
-        if abs(late_s) > _MOST_ROWS * spacing_s:
-            return
-        other = fits.at(late_s, other.log_parameters)
-    fall_from = partial(compute_fall, len(residual), after=other.misfit)
-    fall = fall_from(given.misfit, noise_sd=fits.experiment.noise_sd)
-    values = _moved(diagnosis, given, [other], 0.5)
-    if fall > needed and values:
-        name, late_s = fits.experiment.instrument.controlled.name, other.onset_s
-        of_any = fit_any_sample(fits.posed(0.0).residuals).misfit
-        alike = fall_from(of_any) <= needed
+def _about_load(diagnosis: Diagnosis) -> Iterator[Note]:
+    """Yield a note if a recorded load that comes earlier or later fits better."""
+    given, residuals = diagnosis.likelihood, diagnosis.likelihood.problem.residuals
+    needed, spacing_s = chdtri(1, levels.FALSE_ALARM), spacing_at(residuals.trace.time_s, 0.0)
+    residual, slopes = residuals(given.best)
+    basis = absorbed(np.vstack((slopes, residuals.trace.condensed.taken)))
+    change = residuals.later(_EARLIER * spacing_s).left(given.best) - residual
+    moved = without(basis, change)
+    told = float(moved @ moved)
+    by_chance = float(moved @ residual) ** 2 < needed * given.misfit**2 * told
+    if by_chance or told <= _TOLD * float(change @ change):
+        return
+    from scipy.optimize import minimize_scalar
+
+    most_s = _MOST_ROWS * spacing_s
+    late_s = minimize_scalar(
+        lambda start_s: _at(given, start_s).misfit,
+        bounds=(-most_s, most_s),
+        options={"xatol": _ACCURACY_OF_CLOCK * spacing_s},
+    ).x
+    other = _at(given, late_s)
+    fall_from = partial(compute_fall, residuals.samples, after=other.misfit)
+    fall = fall_from(given.misfit, noise_sd=residuals.trace.known_noise)
+    values = _moved(diagnosis, [other.best], 0.5)
+    if fall > needed and values and abs(late_s) < most_s - spacing_s:
         yield Note(
             DOUBT,
-            f"The {name} seems to be logged {plain(abs(late_s), 2)} s too "
-            f"{'early' if late_s > 0 else 'late'}: moved by that, it fits far better (χ² falls by "
-            f"{plain(fall)}), and {values}. Correct its times if the logger or a filter delays it."
-            f"{' A linear sample of another kind would fit as well.' if alike else ''}",
+            f"The {residuals.instrument.controlled.name} seems to be logged "
+            f"{plain(abs(late_s), 2)} s too {'early' if late_s > 0 else 'late'}: moved by that, it "
+            f"fits far better (χ² falls by {plain(fall)}), and {values}. Correct its times if the "
+            "logger or a filter delays it.",
         )
 
 
@@ -362,117 +344,52 @@ def is_cut_off(time_s: Array) -> bool:
     to the time, as of readings that someone spaced from 0 on.
     """
     few = max(levels.FEWEST_APART, len(time_s) // 10)
-    first_s, last_s = (
-        float(np.ptp(ends)) / few for ends in (time_s[: few + 1], time_s[-few - 1 :])
-    )
+    first_s = float(time_s[few] - time_s[0]) / few
+    last_s = float(time_s[-1] - time_s[-1 - few]) / few
     if time_s[0] <= levels.DELAYED * first_s:
         return False
     growth = np.log(last_s / first_s) / np.log(time_s[-1 - few] / time_s[0])
     return not levels.PLANNED[0] < growth < levels.PLANNED[1]
 
 
-def _about_clock(fits: OnsetFits, diagnosis: Diagnosis) -> Iterator[Note]:
-    """Yield a note if a trace may be on another clock, with its step some time before it."""
-    time_s, best = fits.time_s, diagnosis.likelihood.best
-    later_s, given = 2 * time_s[0] - time_s[1], fits.given(diagnosis.likelihood)
-    rejected = diagnosis.status == REJECTED
-    level, white_sd = chdtri(1, levels.SURELY), levels.WHITE * estimate_noise(fits.readings)
-    tried_s = np.linspace(0.0, later_s, _BETWEEN + 1)[1:].tolist()
-    other = min((fits.at(start_s, best) for start_s in tried_s), key=lambda fit: fit.misfit)
-    if rejected:
-        other = fits.best(later_s)
-    elif compute_fall(len(time_s), given.misfit, other.misfit) > level:
-        other = fits.near(other)
-    alike = _as_good(fits, other)
-    starts_s = [min(fit.onset_s for fit in alike), max(fit.onset_s for fit in alike)]
-    told = starts_s[1] - starts_s[0] < time_s[1] - time_s[0]
-    when = f"at {other.onset_s:.4g} s" if told else "at any time from {:.4g} to {:.4g} s"
-    fall = compute_fall(len(time_s), given.misfit, other.misfit)
-    found = ""
-    if fall > level and 0 < other.onset_s < time_s[0] and other.misfit < white_sd:
-        found = f"the fit is far better (χ² falls by {plain(fall)})"
-        found += "" if told else f", and values hang on it: {_moved(diagnosis, None, alike)}"
-    elif not rejected and fall > -chdtri(1, levels.AS_GOOD):
-        moved = _moved(diagnosis, given, alike, 0.5)
-        found = f"the trace fits as well: {moved}" if moved else ""
-    if found:
-        yield Note(
-            REJECTION if rejected else DOUBT,
-            f"The readings begin {plain(time_s[0])} s after the step of the protocol. If it starts "
-            f"{when.format(*starts_s)} of the clock, {found}. Say when the protocol started "
-            "(--start, measurement.start_s), be it at 0, or what came before (--config, protocol).",
-        )
-
-
-def _as_good(fits: OnsetFits, best: OnsetFit) -> list[OnsetFit]:
-    """Return fits of onsets from 0 to the first reading that are as good as the best, and that."""
-    first_s, interval_s = fits.time_s[0], fits.time_s[1] - fits.time_s[0]
-    onsets_s = first_s - np.geomspace(_NEAREST * interval_s, first_s, _STARTS)
-    found = [best]
-    for side in (onsets_s[onsets_s < best.onset_s], onsets_s[onsets_s > best.onset_s][::-1]):
-        near = best
-        for onset_s in side.tolist():
-            near = fits.at(onset_s, near.log_parameters)
-            if compute_fall(len(fits.time_s), near.misfit, best.misfit) > chdtri(1, levels.UNLIKE):
-                break
-            found.append(near)
-    return found
-
-
-def _moved(
-    diagnosis: Diagnosis, given: OnsetFit | None, others: Sequence[OnsetFit], widths: float = 0.0
-) -> str:
-    """Name what other fits move by some widths of its limits; all if none is compared with."""
-    x, said = diagnosis.likelihood.best, []
-    for each in diagnosis.findings:
-        shift = x - given.log_parameters if given else 0.0
-        moved = [other.log_parameters + shift for other in others]
-        logs, before = [each.quantity.log(own) for own in moved], each.quantity.log(x)
-        width = np.log(each.high / each.low) if each.high and each.low else 0.0
+def _moved(diagnosis: Diagnosis, others: Sequence[Array], widths: float) -> str:
+    """Name what other fits, by their log-parameters, move by some widths of its limits."""
+    said = []
+    for finding in diagnosis.findings:
+        quantity, low, high = finding.quantity, finding.log_low, finding.log_high
+        least = 0.0 if low is None or high is None else widths * (high - low)
+        logs = [quantity.log(x) for x in others]
         far = [
-            not each.allows(own) and abs(after - before) > widths * width
-            for own, after in zip(moved, logs, strict=True)
+            not finding.allows(x) and abs(log - finding.log_best) > least
+            for x, log in zip(others, logs, strict=True)
         ]
-        if given is None or any(far):
+        if any(far):
             ends = dict.fromkeys(plain(float(np.exp(end))) for end in (min(logs), max(logs)))
-            unit = f" {each.quantity.unit}".rstrip()
-            said.append(f"{each.quantity.label} would be {' to '.join(ends)}{unit}")
+            said.append(f"{quantity.label} would be {' to '.join(ends)} {quantity.unit}".rstrip())
     return "; ".join(said)
 
 
-def _about_ramp(fits: OnsetFits, diagnosis: Diagnosis, ramped: Experiment) -> Iterator[Note]:
+def _about_ramp(diagnosis: Diagnosis, ramped: Residuals, *, recorded: bool) -> Iterator[Note]:
     """Yield a note if a ramp up to the first reading moves a value out of its limits."""
-    best, delay_s = diagnosis.likelihood.best, float(fits.time_s[0])
-    given = fits.given(diagnosis.likelihood)
-    other = replace(fits, experiment=ramped).at(0.0, best)
-    said, how = [], "A ramp is given by --ramp DURATION, or as recorded (--load)."
-    if moved := _moved(diagnosis, given, [other], 1.0):
-        ends = f"ends with the first reading, at {plain(delay_s)} s"
-        said.append(f"If the load was no step but a ramp that {ends}: {moved}.")
-    if ramped.record is not None:
-        how = "Rows of the load before its first one would tell."
-    if said:
-        yield Note(HARMLESS, " ".join([*said, how]))
+    likelihood = diagnosis.likelihood
+    fit = fit_from([replace(likelihood.problem, residuals=ramped)], likelihood.best)
+    if moved := _moved(diagnosis, [fit.x[0]], 1.0):
+        how = "A ramp is given by --ramp DURATION, or as recorded (--load)."
+        if recorded:
+            how = "Rows of the load before its first one would tell."
+        ends = f"ends with the first reading, at {plain(float(ramped.trace.time_s[0]))} s"
+        text = f"If the load was no step but a ramp that {ends}: {moved}. {how}"
+        yield Note(HARMLESS, text)
 
 
-def _with_ramp(experiment: Experiment, time_s: Array) -> Experiment | None:
-    """Return one with a ramp up to the first reading, none but for a hold until after that."""
-    delay_s, record = float(time_s[0]), experiment.record
-    if record is not None:
-        later = record[record[:, 0] > delay_s]
-        level, before = record[0, 1], record[: len(record) - len(later), 1]
-        if delay_s <= 0 or not level or np.ptp(before) > levels.HELD * abs(level):
-            return None
-        return replace(experiment, record=np.vstack(([0.0, 0.0], [delay_s, level], later)))
-    first, *rest = experiment.phases
-    if not 0 < delay_s < first.duration_s or first.slope or first.curvature:
+def _with_ramp(residuals: Residuals) -> Residuals | None:
+    """Return them with steps reached within the first reading; None but for a hold until then."""
+    course, delay_s = residuals.course, float(residuals.trace.time_s[0])
+    early_s = np.append(course.time_s[course.time_s <= delay_s], delay_s)
+    loads = evaluate(course, early_s)
+    if delay_s <= 0 or not loads[0] or np.ptp(loads) > levels.HELD * abs(loads[0]):
         return None
-    phases = (
-        ramp(delay_s, 0.0, first.level),
-        replace(first, duration_s=first.duration_s - delay_s),
-        *rest,
-    )
-    return replace(experiment, phases=phases)
+    return residuals.under(course.risen(delay_s))
 
 
 def onset_limits(best: Likelihood, time_s: Array) -> tuple[float, float]:
@@ -485,21 +402,23 @@ def profile_over_onset(diagnosis: Diagnosis, time_s: Array) -> Diagnosis:
     """Return a diagnosis whose limits allow for the onset, with times from it, and its limits."""
     best = diagnosis.likelihood
     ends = onset_limits(best, time_s)
-    diagnosis = replace(diagnosis, onset_limits_s=ends)
+    notes = diagnosis.notes
     if ends[1] - ends[0] > levels.KNOWN_START * spacing_at(time_s, 0.0):
         # Nothing tells how soon after a change of the torque a reading came.
-        notes = [note for note in diagnosis.notes if note.about != RING]
-        diagnosis = replace(diagnosis, notes=notes)
+        notes = [note for note in notes if note.about != RING]
+    diagnosis = replace(diagnosis, onset_limits_s=ends, notes=notes)
     others = [_at(best, float(change_s)) for end in ends for change_s in end * _SHARES]
     others = [each for each in others if each.threshold > 0]
     if not others:
         return diagnosis
     found = [*diagnosis.findings, *(trade.finding for trade in diagnosis.trades)]
-    every = compute_profiles(others, [finding.quantity for finding in found], smooth=False)
-    costs = [best.threshold - each.threshold for each in others]
-    by_quantity = zip(*every, strict=True)
+    every = compute_findings(others, [finding.quantity for finding in found])
+    costs = [best.threshold - other.threshold for other in others]
     at_ends = [_at(best, end_s).best for end_s in ends]
-    merged = [_merged(*each, costs, at_ends) for each in zip(found, by_quantity, strict=True)]
+    merged = [
+        _merged(finding, of_others, costs, at_ends)
+        for finding, *of_others in zip(found, *every, strict=True)
+    ]
     kept = len(diagnosis.findings)
     pairs = zip(diagnosis.trades, merged[kept:], strict=True)
     trades = [replace(trade, finding=finding) for trade, finding in pairs]
@@ -537,30 +456,26 @@ def _end(best: Likelihood, step_s: float) -> float:
 
 
 def _merged(
-    finding: Finding, profiles: Sequence[Profile], costs: list[float], at_ends: list[Array]
+    finding: Finding, of_others: Sequence[Finding], costs: list[float], at_ends: list[Array]
 ) -> Finding:
     """Return a finding with the lowest profile of its own and those of other onsets; no gaps.
 
     At the ends of the onset's interval nothing but their best fits is within the limits.
     """
-    own = finding.profile
-    values: Array = np.unique(np.concatenate([p.log_values for p in (own, *profiles)]))
+    every = [finding, *of_others]
+    values: Array = np.unique(np.concatenate([one.log_values for one in every]))
     rows = [
-        np.interp(values, profile.log_values, profile.increases + cost)
-        for profile, cost in zip((own, *profiles), (0.0, *costs), strict=True)
+        np.interp(values, one.log_values, np.sqrt(np.maximum(one.increases, 0.0))) ** 2 + cost
+        for one, cost in zip(every, (0.0, *costs), strict=True)
     ]
-    increases: Array = np.min(rows, axis=0)
-    ends = [(profile.low, profile.high) for profile in (own, *profiles)]
-    lows, highs = ([end for end in side if end is not None] for side in zip(*ends, strict=True))
+    lows = [one.log_low for one in every if one.log_low is not None]
+    highs = [one.log_high for one in every if one.log_high is not None]
     fitted = [finding.quantity.log(x) for x in at_ends]
     return replace(
         finding,
-        profile=replace(
-            own,
-            log_values=values,
-            increases=increases,
-            low=min(*lows, *fitted) if len(lows) == len(ends) else None,
-            high=max(*highs, *fitted) if len(highs) == len(ends) else None,
-            gaps=(),
-        ),
+        log_values=values,
+        increases=np.min(rows, axis=0),
+        log_low=min(*lows, *fitted) if len(lows) == len(every) else None,
+        log_high=max(*highs, *fitted) if len(highs) == len(every) else None,
+        log_gaps=(),
     )

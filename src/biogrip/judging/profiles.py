@@ -1,4 +1,9 @@
-"""Profile likelihood: minimum of chi^2 over all parameters against one quantity [1]_, [2]_.
+"""Profile likelihoods, limits, and verdicts: determined, bounded on one side, or not determined.
+
+A profile is the minimum of chi^2 over all parameters against one quantity [1]_, [2]_. It has a
+limit on a side if it exceeds `Likelihood.certainty` (99.9 %) at that end of the search range; the
+limit is where it crosses `Likelihood.threshold` (95 %, or the confidence asked for). The verdict is
+which of the two limits there are; `Finding.words` has the words of each.
 
 All quantities of many traces are profiled at once, over their whole search ranges. All points are
 fitted from the optimum, then from the fits of both neighbours, again and again where these have
@@ -16,25 +21,153 @@ References
 .. [3] M. Dowell and P. Jarratt, BIT 11 (1971), 168-174.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 import numpy as np
 
 import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray, IntArray
+from biogrip.digits import plain, with_limits, within_limits
 from biogrip.fit.least_squares import FAIR, FINE, alike
 from biogrip.judging.constrained_fits import CLOSE, ConstrainedFits
-from biogrip.judging.likelihood import Likelihood
-from biogrip.judging.quantities import Quantity
+from biogrip.judging.likelihood import Likelihood, Quantity, find_combinations
 
-HIGHEST = 16.0
-"""Increase of chi^2 up to which a profile has dense points, as figures show no more."""
+DETERMINED = "determined"
+BOUNDED_BELOW = "bounded below"
+BOUNDED_ABOVE = "bounded above"
+NOT_DETERMINED = "not determined"
+FIT_REJECTED = "fit rejected"
+"""Verdict on every quantity of a fit that is rejected."""
 
-# Largest difference between neighbours of the square root of the increase, which is nearly linear.
-_ROOT_STEP = 0.3
-_MOST_HALVINGS = 8
+
+def verdict_of(low: float | None, high: float | None) -> str:
+    """Return the verdict on a quantity with these limits."""
+    if low is None:
+        return NOT_DETERMINED if high is None else BOUNDED_ABOVE
+    return BOUNDED_BELOW if high is None else DETERMINED
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A quantity, the profile of its logarithm, its limits, and the verdict on it."""
+
+    quantity: Quantity
+    log_values: Array
+    """Ascending logarithms, (n_points,)."""
+    increases: Array
+    """Increase of chi^2 at each, (n_points,)."""
+    log_best: float
+    """Logarithm at the optimum."""
+    log_low: float | None
+    """Lower confidence limit; None where the trace sets none."""
+    log_high: float | None
+    """Upper confidence limit, likewise."""
+    lowest: Array
+    """Log-parameters of the lowest increase, negative if the optimum was missed."""
+    deviation: float
+    """Standard deviation of its logarithm to first order, see `Likelihood.deviation`."""
+    log_gaps: tuple[tuple[float, float], ...] = ()
+    """Stretches between the limits in which the profile is above the threshold."""
+    slowest_s: float | None = None
+    """Relaxation time of a branch of the best fit that denies limits, as it should be within the
+    trace."""
+
+    @property
+    def verdict(self) -> str:
+        """Verdict: determined, bounded below or above, or not determined."""
+        return verdict_of(self.log_low, self.log_high)
+
+    @property
+    def value(self) -> float:
+        """Best estimate in SI units, meaningful only if the quantity is determined."""
+        return math.exp(self.log_best)
+
+    @property
+    def low(self) -> float | None:
+        """Lower confidence limit in SI units."""
+        return None if self.log_low is None else math.exp(self.log_low)
+
+    @property
+    def high(self) -> float | None:
+        """Upper confidence limit in SI units."""
+        return None if self.log_high is None else math.exp(self.log_high)
+
+    @property
+    def gaps(self) -> list[tuple[float, float]]:
+        """Stretches between the limits that are excluded, in SI units."""
+        return [(math.exp(start), math.exp(end)) for start, end in self.log_gaps]
+
+    @property
+    def is_bounded(self) -> bool:
+        """True if the trace bounds the quantity on at least one side."""
+        return self.verdict != NOT_DETERMINED
+
+    @property
+    def is_wide(self) -> bool:
+        """True if its two limits tell little more than an order of magnitude: see `WIDE`."""
+        low, high = self.low, self.high
+        return low is not None and high is not None and high > levels.WIDE**2 * low
+
+    def allows(self, log_parameters: Array) -> bool:
+        """Return True if parameters, (n_parameters,), lie within the limits; NaN does."""
+        value = self.quantity.log(log_parameters)
+        low, high = self.log_low, self.log_high
+        beyond = (low is not None and value < low) or (high is not None and value > high)
+        return not (beyond or any(start < value < end for start, end in self.log_gaps))
+
+    def words(self) -> str:
+        """Return the verdict in words, e.g. ``determined: 34.1 N/m (31.2 to 37.3)``."""
+        words, unit = self._limits_in_words(), self._unit
+        if self.gaps:
+            ends = (end for gap in self.gaps for end in gap)
+            gaps = within_limits(self.value, self.low or 0.0, self.high or 0.0, *ends)[3:]
+            but = " and ".join(map(" to ".join, zip(gaps[::2], gaps[1::2], strict=True)))
+            words += f", except {but}{unit}"
+        if self.quantity.provided and self.is_bounded:
+            words += f", provided {self.quantity.provided}"
+        return words
+
+    def _limits_in_words(self) -> str:
+        low, high, unit = self.low, self.high, self._unit
+        if low is not None and high is not None:
+            decades = plain(math.log10(high / low), 2)
+            how = f" only to {decades} decades" if self.is_wide else ""
+            return f"determined{how}: {with_limits(self.value, low, high, self.quantity.unit)}"
+        if low is not None:
+            return f"only bounded below: at least {plain(low, 2)}{unit}"
+        if high is not None:
+            return f"only bounded above: at most {plain(high, 2)}{unit}"
+        if self.slowest_s is not None:
+            slowest = f"a branch of the best fit relaxes in {plain(self.slowest_s, 2)} s,"
+            return f"not stated: {slowest} longer than the trace lasts"
+        return "not determined: the trace sets no limit within the search range"
+
+    @property
+    def _unit(self) -> str:
+        return f" {self.quantity.unit}" if self.quantity.unit else ""
+
+
+@dataclass(frozen=True)
+class Trade:
+    """Parameters of which only a combination is determined."""
+
+    members: tuple[str, ...]
+    """Names of parameters that trade against each other."""
+    finding: Finding
+    """The combination that is determined."""
+
+    def words(self) -> str:
+        """Return the trade as a sentence."""
+        names = " and ".join(self.members)
+        what = self.finding.words().partition(": ")[2]
+        return (
+            f"{names} trade against each other; determined is {self.finding.quantity.label}: {what}"
+        )
+
+
 # Improvement of a fit, relative to 1 + increase of chi^2, that has its neighbours fitted again.
 _LEAST_IMPROVEMENT = 1e-3
 
@@ -60,11 +193,11 @@ class Points:
         point = np.flatnonzero(~self._optimum)
         self._try(point, point, FAIR)
 
-    def from_neighbours(self, news: BoolArray | None = None) -> None:
-        """Fit points from their neighbours' fits, of all or of some, as long as these improve."""
+    def from_neighbours(self) -> None:
+        """Fit points from their neighbours' fits as long as these improve."""
         # Optima, and places beyond the ends, belong to no profile here: they are not fitted.
         to_fit = np.append(np.where(self._optimum, -1, self.profile), -1)
-        news = np.full(len(self.values), True) if news is None else news
+        news = np.full(len(self.values), True)
         while np.any(news):
             start = np.tile(np.flatnonzero(news), 2)
             point = start + np.repeat((-1, 1), len(start) // 2)
@@ -88,60 +221,17 @@ class Points:
         ends = self.x[self.ends()].reshape(2, len(self.fits.likelihoods), -1, self.x.shape[1])
         return np.concatenate(ends.swapaxes(1, 2))
 
-    def smooth(self, limits: Array) -> None:
-        """Add limits, (n_profiles, 2) or NaN, and midpoints of neighbours far apart in drawings."""
-        profile, side = np.nonzero(np.isfinite(limits))
-        values = limits[profile, side]
-        below = (self.profile == profile[:, None]) & (self.values < values[:, None])
-        left = self.ends()[0, profile] + np.sum(below, axis=1) - 1
-        new = self.values[left + 1] != values
-        self._add(left[new], values[new])
-        self._deepen(np.flatnonzero(np.isin(self.values, values[new])))
-        for _ in range(_MOST_HALVINGS):
-            roots = np.sqrt(np.clip(self.increases, 0.0, HIGHEST))
-            left = np.flatnonzero(
-                (np.abs(np.diff(roots)) > _ROOT_STEP) & (np.diff(self.profile) == 0)
-            )
-            self._add(left, 0.5 * (self.values[left] + self.values[left + 1]))
-
-    def _deepen(self, limits: IntArray) -> None:
-        """Fit limits above the threshold from the ends of all profiles, and their neighbours."""
-        profile = self.profile[limits]
-        missed = self.increases[limits] > levels.GAP * self.fits.threshold[profile]
-        limits, profile = limits[missed], profile[missed]
-        if not len(limits):
-            return
-        starts = self.extremes()[:, self.fits.trace[profile]]
-        increases, x = self.fits.from_each(profile, self.values[limits], starts, CLOSE)
-        self.increases[limits], self.x[limits] = np.min(increases, axis=0), x
-        self.from_neighbours(np.isin(np.arange(len(self.values)), limits))
-
-    def _add(self, left: IntArray, values: Array) -> None:
-        """Insert points after given ones, each with the lower of the fits from both neighbours."""
-        if not len(left):
-            return
-        profile, right = self.profile[left], left + 1
-        increases, x = self.fits.from_each(profile, values, self.x[np.stack((left, right))], CLOSE)
-        self.profile = np.insert(self.profile, right, profile)
-        self.values = np.insert(self.values, right, values)
-        self._optimum = np.insert(self._optimum, right, False)
-        self.increases = np.insert(self.increases, right, np.min(increases, axis=0))
-        self.x = np.insert(self.x, right, x, axis=0)
-
 
 def keep_lower(
     increases: Array, x: Array, point: IntArray, fitted_increases: Array, fitted: Array
 ) -> BoolArray:
     """Keep lower fits of points, one or more each, in place; return which improved much."""
-    news = np.zeros(len(increases), dtype=bool)
-    for at, increase, parameters in zip(
-        point.tolist(), fitted_increases.tolist(), fitted, strict=True
-    ):
-        before = increases[at]
-        if increase < before:
-            news[at] |= increase < before - _LEAST_IMPROVEMENT * (1 + abs(increase))
-            increases[at], x[at] = increase, parameters
-    return news
+    before = increases.copy()
+    # Of several fits of a point the lowest comes last, and stays.
+    order = np.argsort(-fitted_increases, kind="stable")
+    lower = order[fitted_increases[order] < before[point[order]]]
+    increases[point[lower]], x[point[lower]] = fitted_increases[lower], fitted[lower]
+    return increases < before - _LEAST_IMPROVEMENT * (1 + np.abs(increases))
 
 
 # Points near the best fit, in standard deviations, that every profile has.
@@ -152,164 +242,89 @@ _LEAST_GAP_OF_POINTS = 1e-9
 _ROOT_ERROR = 1e-5
 
 
-@dataclass(frozen=True)
-class Profile:
-    """A profile and its confidence limits, as logarithms of the quantity."""
-
-    log_values: Array
-    """Ascending values, (n_points,)."""
-    increases: Array
-    """Increase of chi^2 at each, (n_points,)."""
-    best: float
-    """Value at the optimum."""
-    low: float | None
-    """Lower confidence limit; None where the trace sets none."""
-    high: float | None
-    """Upper confidence limit, likewise."""
-    lowest: Array
-    """Log-parameters of the lowest increase, negative if the optimum was missed."""
-    gaps: tuple[tuple[float, float], ...] = ()
-    """Stretches between the limits in which the profile is above the threshold."""
-    certainty: float | None = None
-    """Increase that a limit takes at an end of the range, if an end is above the threshold and yet
-    has no limit for want of it; else None."""
-    slowest_s: float | None = None
-    """Relaxation time of a branch of the best fit that denies limits, as it should be within the
-    trace."""
-
-
-def compute_profiles(
-    likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity], *, smooth: bool = True
-) -> list[list[Profile]]:
-    """Compute profiles and limits by trace and quantity, with points for a drawing if `smooth`."""
-    by_trace: dict[int, list[Profile]] = {}
+def compute_findings(
+    likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity]
+) -> list[list[Finding]]:
+    """Profile quantities in each of several traces, and reach a verdict on each of them."""
+    by_trace: dict[int, list[Finding]] = {}
     count = len(quantities)
     for group in alike([likelihood.problem for likelihood in likelihoods]):
         fits = ConstrainedFits([likelihoods[index] for index in group], quantities)
-        profiles = _profiles(fits, smooth=smooth)
+        findings = _findings(fits)
         for place, index in enumerate(group.tolist()):
-            by_trace[index] = profiles[place * count : (place + 1) * count]
+            by_trace[index] = findings[place * count : (place + 1) * count]
     return [by_trace[index] for index in range(len(likelihoods))]
 
 
-def _profiles(fits: ConstrainedFits, *, smooth: bool) -> list[Profile]:
-    grids = [
-        _grid_of(likelihood, quantity)
-        for likelihood in fits.likelihoods
-        for quantity in fits.quantities
-    ]
-    points = Points(fits, grids)
+def _findings(fits: ConstrainedFits) -> list[Finding]:
+    pairs = [(one, quantity) for one in fits.likelihoods for quantity in fits.quantities]
+    deviations = [likelihood.deviation(quantity) for likelihood, quantity in pairs]
+    of_grids = zip(pairs, deviations, strict=True)
+    points = Points(fits, [_grid_of(*pair, deviation) for pair, deviation in of_grids])
     points.from_optimum()
     points.from_neighbours()
-    limits = _find_crossings(points).T
-    if smooth:
-        points.smooth(limits)
-    profiles = []
-    for index, ends in enumerate(limits.tolist()):
-        in_profile = points.profile == index
-        values, increases, x = (
-            points.values[in_profile],
-            points.increases[in_profile],
-            points.x[in_profile],
-        )
-        gaps = find_gaps(values, increases, float(fits.threshold[index]))
-        lowest = x[int(np.argmin(increases))]
-        short = (increases[[0, -1]] > fits.threshold[index]) & np.isnan(ends)
-        certainty = float(fits.certainty[index]) if np.any(short) else None
-        best = float(fits.at_best[index])
-        slowest_s = fits.slowest(index)
-        if np.min(increases[values != best], initial=np.inf) <= fits.threshold[index]:
+    limits, at_limits = _find_crossings(points)
+    findings = []
+    for index, (likelihood, quantity) in enumerate(pairs):
+        of = points.profile == index
+        values, increases, x = points.values[of], points.increases[of], points.x[of]
+        best, threshold = float(fits.at_best[index]), float(fits.threshold[index])
+        slowest_s, ends = fits.slowest(index), limits[:, index]
+        if np.min(increases[values != best], initial=np.inf) <= threshold:
             slowest_s = None
-        problem = fits.likelihoods[fits.trace[index]].problem
-        quantity = fits.quantities[index % len(fits.quantities)]
-        made = values[quantity.at_end(x, problem.low, problem.high, values > best)]
-        low, high = (None if np.isnan(end) or end in made else end for end in ends)
-        if slowest_s is not None:
-            low, high, gaps, certainty = None, None, (), None
-        profiles.append(
-            Profile(values, increases, best, low, high, lowest, gaps, certainty, slowest_s)
-        )
-    return profiles
+        # Limits that the ends of search ranges make are none.
+        ranges, above = (likelihood.problem.low, likelihood.problem.high), np.array([False, True])
+        ends = np.where(quantity.at_end(at_limits[:, index], *ranges, above), np.nan, ends)
+        told = ends[np.isfinite(ends)] if slowest_s is None else ends[:0]
+        low, high = (float(end) if end in told else None for end in ends)
+        lowest, increases = x[int(np.argmin(increases))], np.append(increases, threshold + 0 * told)
+        values = np.append(values, told)
+        order = np.argsort(values, kind="stable")
+        shown = quantity, values[order], increases[order], best, low, high, lowest
+        gaps = find_gaps(*shown[1:3], threshold) if slowest_s is None else ()
+        findings.append(Finding(*shown, deviations[index], gaps, slowest_s))
+    return findings
 
 
-def _grid_of(likelihood: Likelihood, quantity: Quantity) -> Array:
+def _grid_of(likelihood: Likelihood, quantity: Quantity, deviation: float) -> Array:
     """Return ascending values over a quantity's whole range, denser near the optimum."""
     low, high = quantity.range(likelihood.problem.low, likelihood.problem.high)
     start = quantity.log(likelihood.best)
-    near = start + likelihood.deviation(quantity) * _NEAR_OPTIMUM
+    near = start + deviation * _NEAR_OPTIMUM
     others = np.concatenate((near[(near > low) & (near < high)], np.linspace(low, high, _EVENLY)))
     # Rounding must not make two points of an optimum that lies at an end.
     return np.unique(np.append(others[np.abs(others - start) > _LEAST_GAP_OF_POINTS], start))
 
 
-def _find_crossings(points: Points) -> Array:
-    """Find the limits, where profiles cross the threshold, (2, n_profiles); NaN without limit."""
+def _find_crossings(points: Points) -> tuple[Array, Array]:
+    """Find the limits, where profiles cross the threshold, (2, n_profiles); NaN without limit.
+
+    Returns their fits, too, (2, n_profiles, n_parameters).
+    """
     fits, ends = points.fits, points.ends()
-    crossed = np.full(ends.shape, np.nan)
+    crossed, at_crossings = np.full(ends.shape, np.nan), fits.best[np.zeros_like(ends)]
     end, profile = np.nonzero(points.increases[ends] > fits.certainty)
     while len(profile):
         below = np.flatnonzero(points.increases < fits.threshold[points.profile])
         of_below = points.profile[below]
-        first, last = (
-            np.searchsorted(of_below, profile),
-            np.searchsorted(of_below, profile, "right") - 1,
-        )
+        first = np.searchsorted(of_below, profile)
+        last = np.searchsorted(of_below, profile, "right") - 1
         inside = below[np.where(end == 0, first, last)]
         outside = np.where(end == 0, inside - 1, inside + 1)
         both = np.stack((inside, outside))
         values, increases, x = points.values[both], points.increases[both], points.x[both]
         elsewhere = points.extremes()[:, fits.trace[profile]]
-        limits = crossings(fits, profile, values, increases, x, elsewhere)
-        crossed[end, profile] = limits
+        limits, fitted = crossings(fits, profile, values, increases, x, elsewhere)
+        crossed[end, profile], at_crossings[end, profile] = limits, fitted
         points.increases[both], points.x[both] = increases, x
         # Where the outer point has come below the threshold, the next bracket is further out.
         on = np.isnan(limits) & (outside != ends[end, profile])
         end, profile = end[on], profile[on]
-    return crossed
+    return crossed, at_crossings
 
 
 # Most fits for a crossing, and the width of an interval in which a profile jumps.
 _MOST_FITS_OF_CROSSING, _WIDTH_OF_JUMP = 40, 1e-7
-
-
-class _Brackets:
-    """Inner and outer ends of n crossings: values, excesses of the root of chi^2, nearest fits.
-
-    Inner ends are below the threshold, (2, n), and outer ones above.
-    """
-
-    def __init__(self, threshold: Array, values: Array, increases: Array, x: Array) -> None:
-        self.threshold, self._root_threshold = threshold, np.sqrt(threshold)
-        self.values, self.x = values.copy(), x.copy()
-        every = np.arange(len(threshold))
-        self.excess = np.stack([self.excess_of(of_end, every) for of_end in increases])
-        self._moved = np.full(len(threshold), -1)
-
-    def excess_of(self, increases: Array, which: IntArray) -> Array:
-        """Return roots of increases of chi^2 minus that of the threshold, (n,)."""
-        return np.sqrt(np.maximum(increases, 0.0)) - self._root_threshold[which]
-
-    def width(self, which: IntArray) -> Array:
-        """Return the distances between both ends, (n,)."""
-        return np.abs(self.values[1, which] - self.values[0, which])
-
-    def between(self, which: IntArray) -> tuple[Array, Array]:
-        """Return values where excesses, joined by lines, vanish, and parameters there."""
-        share = self.excess[0, which] / (self.excess[0, which] - self.excess[1, which])
-        tried = self.values[0, which] + share * (self.values[1, which] - self.values[0, which])
-        return tried, self.x[0, which] + share[:, None] * (self.x[1, which] - self.x[0, which])
-
-    def move(self, which: IntArray, tried: Array, over: Array, fitted: Array) -> None:
-        """Move an end to tried values, by the Illinois rule.
-
-        The excess of an end that stays a second time is halved, so that the end moves, too.
-        """
-        side = (over > 0).astype(np.int64)
-        self.values[side, which], self.excess[side, which] = tried, over
-        self.x[side, which] = fitted
-        again = self._moved[which] == side
-        self.excess[1 - side[again], which[again]] *= 0.5
-        self._moved[which] = side
 
 
 def crossings(
@@ -319,7 +334,7 @@ def crossings(
     increases: Array,
     x: Array,
     elsewhere: Array,
-) -> Array:
+) -> tuple[Array, Array]:
     """Find the logarithms of quantities at which the increase of chi^2 equals the threshold, (n,).
 
     1. A value is tried between an inner end, below the threshold, and an outer, above it.
@@ -340,34 +355,48 @@ def crossings(
 
     Returns
     -------
-    Array
-        NaN where a deeper basin is below the threshold at the outer end: the crossing is further
-        out.
+    tuple[Array, Array]
+        The crossings, NaN where a deeper basin is below the threshold at the outer end, as the
+        crossing is further out; and their fits, (n, n_parameters).
     """
-    brackets = _Brackets(fits.threshold[profile], values, increases, x)
-    crossed, left = values[1].copy(), np.arange(len(profile))
+    threshold = fits.threshold[profile]
+    ends, ends_x, excess = values.copy(), x.copy(), excess_of(increases, threshold)
+    crossed, at_crossings, left = values[1].copy(), x[1].copy(), np.arange(len(profile))
+    moved = np.full(len(profile), -1)
     for trial in range(_MOST_FITS_OF_CROSSING):
         if not len(left):
             break
-        tried, between = brackets.between(left)
-        starts = np.concatenate((between[None], brackets.x[:, left]))
+        share = excess[0, left] / (excess[0, left] - excess[1, left])
+        tried = ends[0, left] + share * (ends[1, left] - ends[0, left])
+        inner_x, outer_x = ends_x[:, left]
+        starts = np.stack((inner_x + share[:, None] * (outer_x - inner_x), inner_x, outer_x))
         if not trial:
             _, deepest = fits.from_each(profile, tried, elsewhere, FAIR)
             starts = np.concatenate((starts, deepest[None]))
         reached, fitted = fits.from_each(profile[left], tried, starts, FINE)
-        over = brackets.excess_of(np.min(reached, axis=0), left)
-        missed = brackets.excess_of(reached[2], left) > over + _ROOT_ERROR
+        over = excess_of(np.min(reached, axis=0), threshold[left])
+        missed = excess_of(reached[2], threshold[left]) > over + _ROOT_ERROR
         if np.any(missed):
             outer = left[missed]
             beyond = fits.at(profile[outer], values[1, outer], fitted[missed], FINE)
             keep_lower(increases[1], x[1], outer, *beyond)
-        void = increases[1, left] < brackets.threshold[left]
-        crossed[left] = np.where(void, np.nan, tried)
-        brackets.move(left, tried, over, fitted)
+        void = increases[1, left] < threshold[left]
+        crossed[left], at_crossings[left] = np.where(void, np.nan, tried), fitted
+        side = (over > 0).astype(np.int64)
+        ends[side, left], ends_x[side, left], excess[side, left] = tried, fitted, over
+        # The excess of an end that stays a second time is halved, so that the end moves, too.
+        again = moved[left] == side
+        excess[1 - side[again], left[again]] *= 0.5
+        moved[left] = side
         # Where a deeper basin begins, the increase may jump past the threshold.
-        apart = brackets.width(left) > _WIDTH_OF_JUMP
+        apart = np.abs(ends[1, left] - ends[0, left]) > _WIDTH_OF_JUMP
         left = left[(np.abs(over) > _ROOT_ERROR) & apart & ~void]
-    return crossed
+    return crossed, at_crossings
+
+
+def excess_of(increases: Array, threshold: Array) -> Array:
+    """Return roots of increases of chi^2 minus that of the threshold, (..., n)."""
+    return np.sqrt(np.maximum(increases, 0.0)) - np.sqrt(threshold)
 
 
 def find_gaps(
@@ -383,3 +412,33 @@ def find_gaps(
             first, last = (np.interp(np.sqrt(threshold), roots[of], log_values[of]) for of in sides)
             gaps.append((float(first), float(last)))
     return tuple(gaps)
+
+
+def find_trade_offs(likelihood: Likelihood, findings: Sequence[Finding]) -> list[Trade]:
+    """Find determined combinations of undetermined parameters.
+
+    Combinations among the findings come first. Of other pairs, the combination known best to first
+    order is profiled, if it is worth a look.
+    """
+    model, trades = likelihood.problem.residuals.model, list[tuple[tuple[int, ...], Finding]]()
+    left = [
+        finding.quantity.members[0]
+        for finding in findings
+        if len(finding.quantity.members) == 1 and finding.verdict != DETERMINED
+    ]
+    for finding in findings:
+        members = tuple(index for index in finding.quantity.members if index in left)
+        if len(members) > 1:
+            trades.append((members, finding))
+            left = [index for index in left if index not in members]
+    for pair in combinations(left, 2):
+        candidates = find_combinations(model, list(pair))
+        best = min(candidates, key=likelihood.deviation, default=None)
+        if best is not None and likelihood.deviation(best) < levels.WORTH_A_PROFILE:
+            ((finding,),) = compute_findings([likelihood], [best])
+            trades.append((pair, finding))
+    return [
+        Trade(tuple(model.parameters[index].name for index in members), finding)
+        for members, finding in trades
+        if finding.verdict == DETERMINED
+    ]

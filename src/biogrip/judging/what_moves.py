@@ -20,8 +20,7 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.digits import plain
-from biogrip.judging.likelihood import Likelihood
-from biogrip.judging.quantities import Quantity
+from biogrip.judging.likelihood import Likelihood, Quantity
 from biogrip.physics.protocol import is_storage, spacing_at
 from biogrip.physics.residuals import Residuals
 

@@ -10,8 +10,7 @@ A step of all readings from some time on is one direction more: its share of the
 beta-distributed in white noise. `find_step` scans all times; the chance that a scan of correlated
 statistics exceeds a level is that of the first one, and for each further one that of a random
 walk's upcrossing [9]_. `compare_halves` asks whether two parts of the trace, fitted apart, agree:
-Chow's test [8]_, with the fit's slopes. Of a frequency sweep the parts are its moduli, and inertia
-is one direction more (`about_moduli`).
+Chow's test [8]_, with the fit's slopes. Inertia in a frequency sweep is one direction more, too.
 
 Residuals, (n_samples,), are over the noise's standard deviation where that is not the same. The
 basis of what the fit absorbs has orthonormal rows, (n_directions, n_samples), see `absorbed`.
@@ -19,7 +18,6 @@ basis of what the fit absorbs has orthonormal rows, (n_directions, n_samples), s
 References
 ----------
 .. [1] J. Durbin and G. S. Watson, Biometrika 38 (1951), 159-177: section 4.
-.. [2] J. Durbin, Biometrika 56 (1969), 1-15: the cumulative periodogram.
 .. [3] R. D. Cook and S. Weisberg, Residuals and Influence in Regression, 1982: section 2.2.2.
 .. [4] H. D. Patterson and R. Thompson, Biometrika 58 (1971), 545-554: restricted likelihood.
 .. [5] F. E. Satterthwaite, Biometrics Bulletin 2 (1946), 110-114.
@@ -29,17 +27,16 @@ References
 .. [9] D. Siegmund and B. Yakir, The Statistics of Gene Mapping, Springer, 2007: section 5.2.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from scipy.special import betainc, betaincc, fdtrc, ndtr, ndtri, pdtrc, stdtr
 
 import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray, IntArray
-from biogrip.digits import p_value, plain
-from biogrip.fit.noise_model_fit import absorbed
+from biogrip.digits import plain
+from biogrip.fit.trace_noise import absorbed
 from biogrip.physics.noise import without
 from biogrip.physics.protocol import is_storage
 from biogrip.physics.residuals import Residuals
@@ -126,30 +123,6 @@ def _chance_of_less(observed: float, first: float, second: float, free: int, mos
     return float(chance)
 
 
-def uneven(residual: Array, basis: Array) -> float:
-    """Return the p-value of the cumulative periodogram test of white noise [2]_.
-
-    The statistic is the largest distance between the cumulative periodogram and that of what the
-    fit leaves of white noise, with Kolmogorov's distribution. The test detects noise with a
-    correlation time of some readings and too small a share to correlate neighbours.
-    """
-    from scipy.fft import prev_fast_len
-    from scipy.special import kolmogorov
-
-    # A transform takes many times the memory if its length has no small factors.
-    n = prev_fast_len(len(residual))
-    places = slice(1, (n + 1) // 2)
-    power = np.abs(np.fft.rfft(residual[:n])[places]) ** 2
-    if len(power) < 2:
-        return 1.0
-    expected = np.full(len(power), float(n))
-    for row in basis:
-        expected -= np.abs(np.fft.rfft(row[:n])[places]) ** 2
-    reached = np.cumsum(power)[:-1] / np.sum(power)
-    shares = np.cumsum(expected)[:-1] / np.sum(expected)
-    return float(kolmogorov(np.sqrt(len(power)) * np.max(np.abs(reached - shares))))
-
-
 def find_line(residual: Array, time_s: Array) -> tuple[float, float, Array]:
     """Return the frequency of the strongest sine, its chance in white noise, and its directions.
 
@@ -204,9 +177,8 @@ def far_out(residual: Array, struck: BoolArray, basis: Array, freedom: float = n
         return 1.0
     away = np.abs(apart) / np.sqrt(1 + np.sum(own * through, axis=0)) / scale
     known = min(free, freedom)
-    most, least = (
-        2 * len(residual) * float(stdtr(known, -far)) for far in (away.max(), away.min())
-    )
+    most = 2 * len(residual) * float(stdtr(known, -away.max()))
+    least = 2 * len(residual) * float(stdtr(known, -away.min()))
     # Two tests, so each at half the level.
     chance = 2 * min(float(pdtrc(0, most)), float(pdtrc(count - 1, least)))
     return min(chance, 1.0)
@@ -275,37 +247,25 @@ class Steps:
     """Index of the first reading after each, (n_steps,)."""
     whole: Array
     """What each shows in residuals, (n_steps, n_samples)."""
-    basis: Array
-    """What the fit absorbs, (n_directions, n_samples)."""
-    taken: Array
-    """Parts of each along these directions, (n_steps, n_directions)."""
     norms: Array
-    """Norms of what is left of each, (n_steps,)."""
-
-    @property
-    def freedom(self) -> int:
-        """Degrees of freedom of what the fit leaves."""
-        return self.basis.shape[1] - len(self.basis)
+    """Norms of what is left of each without what the fit absorbs, (n_steps,)."""
+    change: Array
+    """One minus the correlation of what is left of each with the next, (n_steps - 1,)."""
+    freedom: int
+    """Degrees of freedom of what the fit leaves."""
 
     def along(self, residual: Array) -> Array:
-        """Return the part of residuals, (n_samples,), along each step without what is absorbed."""
+        """Return the part along each step of what a fit leaves, (n_samples,)."""
         # No matrix of what is left of all steps is formed, which takes most of the time.
-        return self.whole @ without(self.basis, residual) / self.norms
+        return self.whole @ residual / self.norms
 
     def chance(self, share: float) -> float:
         """Return the chance that white noise has such a share of its squares in one of them."""
         alone = float(betaincc(0.5, 0.5 * (self.freedom - 1), min(share, 1.0)))
-        level, change = -float(ndtri(max(alone, 1e-300) / 2)), self._change
-        half = np.maximum(0.5 * level * np.sqrt(2 * change), 1e-9)
+        level = -float(ndtri(max(alone, 1e-300) / 2))
+        half = np.maximum(0.5 * level * np.sqrt(2 * self.change), 1e-9)
         walk = (ndtr(half) - 0.5) / (half * (half * ndtr(half) + _density(half)))
-        return min(alone + float(2 * level * _density(level) * np.sum(change * walk)), 1.0)
-
-    @cached_property
-    def _change(self) -> Array:
-        """One minus the correlation of each with the next, (n_steps - 1,)."""
-        products = np.einsum("ij,ij->i", self.whole[:-1], self.whole[1:])
-        products -= np.einsum("ij,ij->i", self.taken[:-1], self.taken[1:])
-        return np.clip(1 - products / (self.norms[:-1] * self.norms[1:]), 0.0, 1.0)
+        return min(alone + float(2 * level * _density(level) * np.sum(self.change * walk)), 1.0)
 
 
 def _density(level: Array | float) -> Array:
@@ -347,7 +307,11 @@ def steps_of(basis: Array, cleared: Callable[[Array], Array]) -> Steps:
     told = square > levels.TOLD * np.minimum(of_whole, back)
     if not np.all(told):
         before, whole, taken, square = (of[told] for of in (before, whole, taken, square))
-    return Steps(before, whole, basis, taken, np.sqrt(square))
+    norms = np.sqrt(square)
+    products = np.einsum("ij,ij->i", whole[:-1], whole[1:])
+    products -= np.einsum("ij,ij->i", taken[:-1], taken[1:])
+    change = np.clip(1 - products / (norms[:-1] * norms[1:]), 0.0, 1.0)
+    return Steps(before, whole, norms, change, samples - len(basis))
 
 
 def find_step(residual: Array, basis: Array, cleared: Callable[[Array], Array]) -> Step | None:
@@ -355,7 +319,7 @@ def find_step(residual: Array, basis: Array, cleared: Callable[[Array], Array]) 
     steps = steps_of(basis, cleared)
     if not len(steps.before) or steps.freedom < 2:
         return None
-    along = steps.along(residual)
+    along = steps.along(without(basis, residual))
     found = int(np.argmax(np.abs(along)))
     size = float(along[found])
     direction = without(basis, steps.whole[found]) / steps.norms[found]
@@ -375,18 +339,15 @@ def parts_apart(basis: Array, split: int) -> Array:
     return absorbed(apart) if len(apart) else apart
 
 
-def compare_halves(residual: Array, basis: Array, split: int, freedom: float = np.inf) -> float:
-    """Return the chance that parts of white noise before and after a reading differ as much.
-
-    The noise is known with this freedom at most.
-    """
+def compare_halves(residual: Array, basis: Array, split: int) -> float:
+    """Return the chance that parts of white noise before and after a reading differ as much."""
     more = parts_apart(basis, split)
     left = len(residual) - len(basis) - len(more)
     if not len(more) or left < 1:
         return 1.0
     gained = float(np.sum((more @ residual) ** 2))
     rest = max(float(residual @ residual) - gained, 1e-300)
-    return float(fdtrc(len(more), min(left, freedom), gained / len(more) * left / rest))
+    return float(fdtrc(len(more), left, gained / len(more) * left / rest))
 
 
 def find_inertia(
@@ -409,37 +370,3 @@ def find_inertia(
         f"the frequency squared, {part} % at the highest: correct for it, or leave the highest "
         "frequencies out (--until)"
     )
-
-
-def about_moduli(
-    residuals: Residuals, residual: Array, basis: Array, growth: Array
-) -> Iterator[str]:
-    """Yield a sentence for each test that residuals over the growth of the noise fail.
-
-    The tests are for inertia; for moduli that differ, if each is fitted by itself; and for one that
-    scatters more than the other for its weights, by an F test.
-    """
-    storage = is_storage(residuals.trace.time_s)
-    is_inertia, cause = find_inertia(residuals, residual, basis, growth)
-    chance = compare_halves(residual, basis, int(np.sum(~storage)), residuals.freedom)
-    if is_inertia:
-        yield f"The fit leaves what is of {cause}."
-    elif chance < levels.FALSE_ALARM:
-        yield (
-            "The storage and the loss modulus, each fitted by itself, differ by more than white "
-            f"noise ({p_value(chance)}): {cause}."
-        )
-    if residuals.freedom < np.inf:
-        # Their weights are how they scatter.
-        return
-    columns = storage, ~storage
-    free = [float(np.sum(of) - np.sum(basis[:, of] ** 2)) for of in columns]
-    means = [float(np.sum(residual[of] ** 2)) / n for of, n in zip(columns, free, strict=True)]
-    larger = int(means[1] > means[0])
-    ratio = means[larger] / means[1 - larger]
-    if 2 * fdtrc(free[larger], free[1 - larger], ratio) < levels.FALSE_ALARM:
-        yield (
-            f"For its weights the {('storage', 'loss')[larger]} modulus scatters "
-            f"{plain(np.sqrt(ratio), 2)} times as much as the other: give standard deviations of "
-            "both (--sd, --set measurement.loss_sd=COLUMN)."
-        )

@@ -32,13 +32,14 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from scipy.special import chdtrc, chdtri, fdtri
+from scipy.special import chdtrc
 
 import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray
 from biogrip.digits import plain, with_limits
 from biogrip.fit.any_sample import AnySampleFit, Lags, count_lags, fit_any_sample
-from biogrip.judging.verdicts import verdict_of
+from biogrip.judging.likelihood import increase_at
+from biogrip.judging.profiles import verdict_of
 from biogrip.judging.what_moves import Move, as_moves, find_mistakes
 from biogrip.judging.whiteness import as_correlated, correlated
 from biogrip.physics.residuals import Residuals
@@ -188,7 +189,12 @@ def tell_without_model(
     if not is_linear and kinds:
         independent, freedom = as_correlated(*left)
         sd = fit.sd * math.sqrt(free / independent)
-    root = partial(_root, confidence, freedom, float(sd / residuals.noise_scale))
+    unit = float(sd / residuals.noise_scale)
+
+    def root(more: int) -> float:
+        """Return the root of the excess at limits, with more degrees of freedom than one."""
+        return unit * math.sqrt(increase_at(confidence, freedom, 1 + more))
+
     times_s = at_s or times_told(*fit.lags.covered_s)
     chosen = [each for each in _quantities(residuals, fit.lags, times_s) if each.kind in kinds]
     told = [_find_limits(fit, each, root) for each in chosen]
@@ -214,13 +220,6 @@ def _moves(fit: AnySampleFit, quantities: Sequence["_Functional"]) -> list[Move]
     # To first order, changes of logarithms.
     changes = np.array([0.5 * each / given for each in moved]).T
     return as_moves(mistakes, [quantity.name for quantity in quantities], changes)
-
-
-def _root(confidence: float, freedom: float, sd: float, more: int) -> float:
-    """Return the root of the excess at limits, with more degrees of freedom than one."""
-    if freedom == math.inf:
-        return sd * math.sqrt(chdtri(1 + more, 1 - confidence))
-    return sd * math.sqrt((1 + more) * fdtri(1 + more, freedom, confidence))
 
 
 def times_told(first_s: float, last_s: float) -> list[float]:
@@ -355,16 +354,27 @@ class _Excess:
     ) -> tuple[float | None, BoolArray]:
         """Return the limit with certain lags, and which it needs, beginning with a value.
 
-        Each value is held; Newton's step from there leads to the next, or, where that is not
-        between the values known to be inside and outside, half of the way.
+        Each value is held by one more row; Newton's step from there leads to the next, or, where
+        that is not between the values known to be inside and outside, half of the way.
         """
-        held_fit = _HeldFits(self._fit, self._quantity, lags)
+        from scipy.optimize import nnls
+
+        above, below = self._quantity.added(lags)
+        seen: BoolArray = np.any(lags.rows, axis=1)
+        rows, measured = np.column_stack((lags.rows, above)), np.append(self._fit.measured, 0.0)
         inner, outer = self.best, math.inf
         for _ in range(_MOST_TRIALS):
             value = value if side > 0 else max(value, 0.0)
             # Rounding of a row that is far heavier than its value takes would outweigh the trace.
             share = _SHARE_HELD * max(value, self.best) * self._divisor
-            amplitudes, norm, slope = held_fit.at(value, _WEIGHT_HELD / min(self._deviation, share))
+            weight = _WEIGHT_HELD / min(self._deviation, share)
+            is_ratio = self._quantity.below is not None
+            rows[:, -1] = np.where(seen, weight * (above - value * below), 0.0)
+            measured[-1] = 0.0 if is_ratio else weight * value
+            amplitudes, norm = nnls(rows.T, measured, maxiter=100 * len(rows))
+            # Half the slope of the sum of squares.
+            slope = weight * float(measured[-1] - amplitudes @ rows[:, -1])
+            slope *= float(below @ amplitudes) if is_ratio else 1.0
             reached = math.sqrt(max(norm**2 - self._least, 0.0))
             over = reached - root
             if over < 0 and value <= 0:
@@ -381,7 +391,7 @@ class _Excess:
             if far == inner:
                 break
             value = _next_trial(value + step, inner, far, halve=far == outer)
-        return None, held_fit.seen
+        return None, seen
 
 
 def _next_trial(aim: float, inner: float, far: float, *, halve: bool) -> float:
@@ -390,32 +400,6 @@ def _next_trial(aim: float, inner: float, far: float, *, halve: bool) -> float:
     if halve and not _JUMP_WIDTH < share < 1 - _JUMP_WIDTH:
         share = 0.5
     return inner + min(share, 1.0) * (far - inner)
-
-
-class _HeldFits:
-    """Fits of non-negative amplitudes of lags with one more row, which holds a quantity."""
-
-    def __init__(self, fit: AnySampleFit, quantity: _Functional, lags: Lags) -> None:
-        self._above, self._below = quantity.added(lags)
-        self._is_ratio = quantity.below is not None
-        self.seen: BoolArray = np.any(lags.rows, axis=1)
-        self._rows = np.column_stack((lags.rows, self._above))
-        self._measured = np.append(fit.measured, 0.0)
-
-    def at(self, value: float, weight: float) -> tuple[Array, float, float]:
-        """Hold a value; return amplitudes, the norm left, and half the slope of its square."""
-        from scipy.optimize import nnls
-
-        row = weight * (self._above - value * self._below)
-        self._rows[:, -1] = np.where(self.seen, row, 0.0)
-        self._measured[-1] = 0.0 if self._is_ratio else weight * value
-        amplitudes, norm = nnls(self._rows.T, self._measured, maxiter=100 * len(self._rows))
-        force = weight * float(self._measured[-1] - amplitudes @ self._rows[:, -1])
-        return (
-            amplitudes,
-            norm,
-            force * (float(self._below @ amplitudes) if self._is_ratio else 1.0),
-        )
 
 
 def _quantities(residuals: Residuals, lags: Lags, times: Sequence[float]) -> Iterator[_Functional]:

@@ -22,15 +22,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain, pairwise
+from typing import Protocol
 
 import numpy as np
 from numpy.polynomial import chebyshev, legendre
 
 from biogrip.arrays import Array
-from biogrip.physics.modes import Modes, mode_responses, responses_in_turn, sum_of_modes
-from biogrip.physics.noise import PairWhitening, Whitening, without
+from biogrip.physics.modes import mode_responses, responses_in_turn
+from biogrip.physics.noise import without
 from biogrip.physics.protocol import Course
 from biogrip.physics.rate_tables import ModeRows, SpanningModes
+from biogrip.physics.response import Modes, sum_of_modes
 
 _NODES_A_PIECE = 20
 # Square of a norm that may be rounding.
@@ -44,6 +46,16 @@ _TO_LEGENDRE = np.linalg.inv(legendre.legvander(_NODES_OF_PIECE, _DEGREE_OF_PIEC
 _FEWEST_READINGS, _LARGEST_CONDITION = 256, 10.0
 # Most nodes of which orthonormal functions are kept for the next trace.
 _MOST_NODES_KEPT = 20_000
+
+
+class Whitens(Protocol):
+    """What turns noise white, and projects nuisance out (`biogrip.fit.trace_noise`)."""
+
+    nuisance: Array
+    """Functions that are projected out, (n_functions, n_samples)."""
+
+    def __call__(self, rows: Array) -> Array:
+        """Whiten functions of time, (..., n_samples)."""
 
 
 @dataclass(frozen=True)
@@ -130,7 +142,7 @@ class Condensed:
     """Ascending sampling times, (n_samples,)."""
     functions: Array
     """Functions projected out, (n_functions, n_samples), but by whitening (`with_uncertain`)."""
-    whitening: Whitening | PairWhitening | None = None
+    whitening: Whitens | None = None
     """Transformation that whitens noise and projects nuisance out; None for white noise."""
 
     @property

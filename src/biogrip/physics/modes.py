@@ -1,12 +1,8 @@
-"""Modes and responses of the linear model without inertia, with derivatives by the parameters.
+"""Responses of modes and branches to a protocol, with derivatives by their rates.
 
-A parameter with a relative imaginary part of 1e-30 carries its derivative through the arithmetic of
-the transfer function without changing the real part: the complex step [1]_, [2]_. Rates and weights
-of modes, and responses, are differentiated analytically, without cancellation. The result for a
-sample does not depend, to the last bit, on the other samples.
-
-After a load's unit step the response is one of modes e^(r t) - 1, with rates r < 0. So a mode that
-follows a load T(t), and a branch, spring and damper in series, stretched by x(t), obey
+After a load's unit step the response is one of modes e^(r t) - 1, with rates r whose real part is
+negative. So a mode that follows a load T(t), and a branch, spring and damper in series, stretched
+by x(t), obey
 
     g' = r g + r T        g' = r g + x'
 
@@ -16,195 +12,45 @@ branch. Within a phase a load t^n/n! gives, with z = r t,
 
     g = r t^(n+1) phi_(n+1)(z)        dg/dr = t^(n+1) [phi_n(z) - n phi_(n+1)(z)]
 
-for z phi_n'(z) = phi_(n-1)(z) - n phi_n(z), and a deformation t^n/n! gives g = t^n phi_n(z).
+for z phi_n'(z) = phi_(n-1)(z) - n phi_n(z), and a deformation t^n/n! gives g = t^n phi_n(z). If x
+is T, that is g_T + T, and r times it is the rate of g_T.
 
 References
 ----------
-.. [1] W. Squire and G. Trapp, SIAM Review 40 (1998), 110-112: derivatives by complex variables.
-.. [2] J. R. R. A. Martins et al., ACM Transactions on Mathematical Software 29 (2003), 245-262.
-.. [3] J. D. Ferry, Viscoelastic Properties of Polymers, Wiley, 1980, chapter 3.
+.. [1] J. D. Ferry, Viscoelastic Properties of Polymers, Wiley, 1980, chapter 3.
 """
 
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple
+from math import factorial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from biogrip.arrays import Array, IntArray, parts
-from biogrip.physics.gripper import Gripper
 from biogrip.physics.protocol import Course
-from biogrip.physics.response import LEFT, Arms, Impedance, phi_functions
-from biogrip.physics.sample_model import Network, SampleModel
 
-_COMPLEX_STEP = 1e-30
-# Rate at which a bare damper forgets, in 1/s; its force is c times the rate of the deformation.
-_RATE_OF_A_DAMPER = 1e30
 # Numbers formed together, which should fit a processor's cache.
 _MODE_NUMBERS_AT_ONCE = 400_000
 # Phases, and steps of a recursion, that are taken one by one.
 _MOST_ONE_BY_ONE = 50
 
 
-class Modes(NamedTuple):
-    """Step responses of n samples, and their derivatives by the log-parameters."""
-
-    rates: Array
-    """In 1/s, (n, n_modes), negative."""
-    weights: Array
-    """(n, n_modes): the reading over what is controlled."""
-    rate_slopes: Array
-    """(n, n_parameters, n_modes)."""
-    weight_slopes: Array
-    """(n, n_parameters, n_modes)."""
-
-
-def linear_responses(
-    gripper: Gripper,
-    model: SampleModel,
-    course: Course,
-    time_s: Array,
-    parameters: Array,
+def sum_of_responses(
+    rates: NDArray[Any], mixing: NDArray[Any], course: Course, time_s: Array
 ) -> Array:
-    """Compute what is read in the linear model, corrected eqs. (4)-(6), and d/d log p of it.
+    """Return sums of responses of the modes of n samples, (n, n_sums, n_times).
 
-    Times, (n_times,), ascend; parameters, (n, n_parameters), are positive. Returns readings and
-    their derivatives, (n, 1 + n_parameters, n_times).
+    Rates are (n, n_modes). What responses are multiplied by is (n, n_sums, n_modes), or twice as
+    many for them and then their derivatives by the rates. See `mode_responses`.
     """
-    return sum_of_modes(compute_modes(gripper, model, course, parameters), course, time_s)
-
-
-def sum_of_modes(modes: Modes, course: Course, time_s: Array) -> Array:
-    """Return what samples show by all their modes, see `linear_responses`."""
-    n, count, m = modes.rate_slopes.shape
-    # Sums of responses of modes, w g, and their derivatives, d(w g) = dw g + w dr dg/dr.
-    by_response = np.concatenate((modes.weights[:, None], modes.weight_slopes), axis=1)
-    by_slope = np.zeros_like(by_response)
-    by_slope[:, 1:] = modes.weights[:, None] * modes.rate_slopes
-    mixing = np.concatenate((by_response, by_slope), axis=2)
-    rows = np.zeros((n, 1 + count, len(time_s)))
-    for some in parts(n, max(1, _MODE_NUMBERS_AT_ONCE // (m * len(time_s)))):
-        for here, both in responses_in_turn(modes.rates[some], course, time_s):
+    n, sums, terms = mixing.shape
+    rows, slopes = np.zeros((n, sums, len(time_s))), terms > rates.shape[1]
+    for some in parts(n, max(1, _MODE_NUMBERS_AT_ONCE // (rates.shape[1] * len(time_s)))):
+        for here, both in responses_in_turn(rates[some], course, time_s, slopes=slopes):
             # One product per sample: the order of its sums does not depend on their number.
-            rows[some, :, here] = mixing[some] @ np.concatenate(both, axis=1)
+            rows[some, :, here] = (mixing[some] @ np.concatenate(both, axis=1)).real
     return rows
-
-
-def compute_modes(
-    gripper: Gripper,
-    model: SampleModel,
-    course: Course,
-    parameters: Array,
-    *,
-    slopes: bool = True,
-) -> Modes:
-    """Compute the modes of samples, all positive, (n, n_parameters), and their derivatives."""
-    count = parameters.shape[1] if slopes else 0
-    if slopes:
-        # After the samples, copies with each of their parameters tilted into the complex plane.
-        factors = np.ones((count + 1, 1, count), dtype=np.complex128)
-        factors[1:, 0].imag = _COMPLEX_STEP * np.eye(count)
-        parameters = (parameters * factors).reshape(-1, count)
-    network = model.network(parameters)
-    if not course.deforms:
-        *of_modes, d_rates, d_weights = _between_arms(gripper, network, count)
-        of_slopes = (of.transpose(2, 0, 1) for of in (d_rates, d_weights))
-        return Modes(*map(np.ascontiguousarray, (*(of.T for of in of_modes), *of_slopes)))
-    both = [of.reshape(count + 1, -1, of.shape[1]) for of in elements_of(network)]
-    rates, weights = (np.ascontiguousarray(of[0].real) for of in both)
-    return Modes(rates, weights, *((of[1:].imag / _COMPLEX_STEP).swapaxes(0, 1) for of in both))
-
-
-class _SeenBranch(NamedTuple):
-    """A branch of the impedance seen from rates of modes, and derivatives by the log-parameters."""
-
-    weight: Array
-    """K_j, (n,)."""
-    rate: Array
-    """r_j, (n,)."""
-    weight_slope: Array
-    """(n_parameters, n)."""
-    rate_slope: Array
-    """(n_parameters, n)."""
-    inverse: Array
-    """1/(x - r_j), (n_modes, n)."""
-    ratio: Array
-    """x/(x - r_j), (n_modes, n)."""
-
-    @property
-    def moves(self) -> bool:
-        """True if its rate depends on the parameters."""
-        return bool(self.rate_slope.any())
-
-
-def _between_arms(
-    gripper: Gripper, network: Network, count: int
-) -> tuple[Array, Array, Array, Array]:
-    """Compute rates and weights of the left arm, (n_modes, n), and derivatives of both.
-
-    These are by the log-parameters, (n_parameters, n_modes, n). The rates x are the zeros of the
-    impedance H(x; p). With H(x; p) = 0 at a rate, dx = (sum_j dK_j/(x - r_j) + ...) / (S/x^2); the
-    steepness S and the numerators N follow, and the weights, -N/S. The network has n samples, and
-    after them the same with each of `count` parameters tilted by the complex step.
-    """
-    arms = Arms(gripper)
-    tilted = arms.with_sample(network)
-    every = [
-        part.reshape(*part.shape[:-1], count + 1, -1)
-        for part in (tilted.weights, tilted.rates, tilted.level)
-    ]
-    impedance = Impedance(*(part[..., 0, :].real for part in every))
-    slopes = [part[..., 1:, :].imag / _COMPLEX_STEP for part in every]
-    zeros = impedance.zeros()
-    inverses = [1 / zeros.from_pole(rate) for rate in impedance.rates]
-    ratios = [zeros.values * inverse for inverse in inverses]
-    parts_of_all = impedance.weights, impedance.rates, *slopes[:2], inverses, ratios
-    branches = [_SeenBranch(*of_one) for of_one in zip(*parts_of_all, strict=True)]
-    steepness = sum(
-        (branch.weight * branch.ratio**2 for branch in branches), np.zeros_like(zeros.pole)
-    )
-    moved = _moved_zeros(zeros.values, steepness, branches if count else [], slopes[2])
-    steepening = _steepening(moved, branches if count else [])
-    numerators, numerator_slopes = (of_arms[LEFT] for of_arms in arms.rotations(zeros))
-    weights = -numerators / steepness
-    weight_slopes = -(numerator_slopes * moved + weights * steepening) / steepness
-    return -zeros.values, weights, -moved, weight_slopes
-
-
-def _moved_zeros(
-    x: Array, steepness: Array, branches: Sequence[_SeenBranch], level_slope: Array
-) -> Array:
-    """Return the derivatives of zeros x, (n_parameters, n_modes, n)."""
-    moved = np.zeros((len(level_slope), *x.shape)) - level_slope[:, None]
-    for branch in branches:
-        moved += branch.weight_slope[:, None] * branch.inverse
-        if branch.moves:
-            pull = (branch.weight * branch.rate_slope)[:, None]
-            moved += pull * (branch.inverse * branch.inverse)
-    moved *= x * x / steepness
-    return moved
-
-
-def _steepening(moved: Array, branches: Sequence[_SeenBranch]) -> Array:
-    """Return the derivatives of the steepness at zeros that move, (n_parameters, n_modes, n)."""
-    steepening = np.zeros_like(moved)
-    for weight, rate, weight_slope, rate_slope, inverse, ratio in branches:
-        away = 2 * weight * rate * ratio * inverse * inverse
-        steepening += weight_slope[:, None] * (ratio * ratio) - moved * away
-        if rate_slope.any():
-            steepening += rate_slope[:, None] * (2 * weight * (ratio * inverse) * ratio)
-    return steepening
-
-
-def elements_of(network: Network) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Return rates and stiffnesses of elements side by side, (n, n_modes); of bare ones last."""
-    bare = np.stack((network.k_p, _RATE_OF_A_DAMPER * network.c_p), axis=1)
-    fixed = np.broadcast_to([0.0, -_RATE_OF_A_DAMPER], bare.shape)
-    # A branch so weak that its numbers underflow is none.
-    there = network.c.real > 0
-    rates = -network.k / np.where(there, network.c, 1.0)
-    weights = np.where(there, network.k, 0.0)
-    return np.concatenate((rates, fixed), axis=1), np.concatenate((weights, bare), axis=1)
 
 
 def lag_course(course: Course, shares: Sequence[float], time_s: Array) -> Array:
@@ -217,22 +63,22 @@ def lag_course(course: Course, shares: Sequence[float], time_s: Array) -> Array:
     return sign * mode_responses(rates[None], course, time_s)[0]
 
 
-def mode_responses(rates: Array, course: Course, time_s: Array) -> Array:
+def mode_responses(rates: NDArray[Any], course: Course, time_s: Array) -> NDArray[Any]:
     """Compute responses of modes of unit weight, or of branches of unit stiffness.
 
-    Rates in 1/s, (n, n_modes), are real, negative or zero. Times, (n_times,), ascend; at the very
+    Rates in 1/s, (n, n_modes), have no positive real part. Times, (n_times,), ascend; at the very
     instant of a step is what precedes it, and before the protocol nothing responds. Responses are
     (n, n_modes, n_times), in units of what is controlled.
     """
-    responses = np.zeros((*rates.shape, len(time_s)))
+    responses = np.zeros((*rates.shape, len(time_s)), rates.dtype)
     for here, (at_times,) in responses_in_turn(rates, course, time_s, slopes=False):
         responses[..., here] = at_times
     return responses
 
 
 def responses_in_turn(
-    rates: Array, course: Course, time_s: Array, *, slopes: bool = True
-) -> Iterator[tuple[slice, Array]]:
+    rates: NDArray[Any], course: Course, time_s: Array, *, slopes: bool = True
+) -> Iterator[tuple[slice, NDArray[Any]]]:
     """Yield parts of the times after the start, and responses there stacked on dg/dr.
 
     Responses are those of `mode_responses`; without `slopes` there are no derivatives.
@@ -246,7 +92,7 @@ def responses_in_turn(
     firsts = np.append(time_s.searchsorted(course.time_s, side="right"), len(time_s))
     # The step of a deformation is the start of a phase.
     steps = np.append(course.changes[:, 0] * course.deforms, 0.0)
-    state = np.zeros((1 + slopes, *rates.shape))
+    state = np.zeros((1 + slopes, *rates.shape), rates.dtype)
     state[0] += steps[0]
     for phases in parts(len(lengths), at_once):
         powers, lasts = course.within_phases[phases], lengths[phases]
@@ -272,7 +118,7 @@ def responses_in_turn(
 
 
 def moduli_of_modes(rates: Array, places: Array) -> Array:
-    """Compute moduli of branches of unit stiffness, and dg/dr, (2, n, n_modes, n_places) [3]_.
+    """Compute moduli of branches of unit stiffness, and dg/dr, (2, n, n_modes, n_places) [1]_.
 
     A branch that forgets at the rate -r has the complex modulus i w / (i w + r). Its storage part,
     w^2 / (w^2 + r^2), stands at the place w, in rad/s, its loss part, w r / (w^2 + r^2), at -w.
@@ -320,7 +166,7 @@ class _Motion:
         orders = orders[orders >= self._deforms].tolist()
         terms = respond(orders, self._rates, at, deforms=self._deforms, slopes=self._slopes)
         remains = np.exp(self._rates * at)[..., same]
-        gained = np.zeros((1 + self._slopes, *remains.shape))
+        gained = np.zeros((1 + self._slopes, *remains.shape), remains.dtype)
         for order, term in zip(orders, terms, strict=True):
             gained += self._powers[phase, order] * term[..., same]
         return remains, gained
@@ -340,7 +186,7 @@ def _recursion(first: Array, factors: Array, terms: Array) -> Array:
     for k in range(1, block):
         within[k] += scale[k] * within[k - 1]
         scale[k] *= scale[k - 1]
-    starts = np.empty((blocks + 1, *first.shape))
+    starts = np.empty((blocks + 1, *first.shape), first.dtype)
     starts[0] = first
     for k in range(blocks):
         starts[k + 1] = scale[-1, k] * starts[k] + within[-1, k]
@@ -373,3 +219,25 @@ def respond(
             both = rate * power * phis[order + 1], slope
         responses.append(np.stack(both[: 1 + slopes]))
     return responses
+
+
+def phi_functions(most: int, z: NDArray[Any]) -> list[NDArray[Any]]:
+    """Compute phi_n(z) = (e^z - sum_{k<n} z^k/k!) / z^n for n = 0 ... most, at least 1.
+
+    Near zero, where that would cancel, the last is a series, and the others follow from it (M.
+    Hochbruck and A. Ostermann, Acta Numerica 19 (2010), 209-286).
+    """
+    small = np.abs(z) < 1.0
+    near, far = np.where(small, z, 0), np.where(small, 1, z)
+    series = np.zeros_like(near)
+    for k in range(18, -1, -1):
+        series = series * near + 1 / factorial(k + most)
+    value = np.expm1(far) / far
+    phis = [np.exp(z), value]
+    for n in range(1, most):
+        value = (value - 1 / factorial(n)) / far
+        phis.append(value)
+    for n in range(most, 0, -1):
+        phis[n] = np.where(small, series, phis[n])
+        series = series * near + 1 / factorial(n - 1)
+    return phis

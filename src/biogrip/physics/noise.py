@@ -5,20 +5,13 @@ not searched: their span is projected out of trace and responses alike, which is
 them (variable projection) [1]_. Functions whose amplitude has a known standard deviation are
 projected out in part [2]_.
 
-The size of the noise is estimated without a model, and its colour is whitened. The autocorrelation
-is that of white noise plus exponentials of the time between two readings (Ornstein-Uhlenbeck
-processes): one of any relaxation time, and a geometric series of them for 1/f noise. A random walk
-begins with the first reading; the covariance of two of its readings is the time of the earlier one.
-White noise may have a part that grows with the reading. The Cholesky factor L of its matrix C is
-computed, and solved with, in linear time [3]_. Residuals r become L^-1 r, which are white and on
-average as large as r. Least squares of these are generalised least squares [4]_.
+The size of white noise is estimated without a model; that of any other, and its colour, in
+`biogrip.fit.trace_noise`.
 
 References
 ----------
 .. [1] G. H. Golub and V. Pereyra, SIAM Journal on Numerical Analysis 10 (1973), 413-432.
 .. [2] A. M. Stuart, Acta Numerica 19 (2010), 451-559: a Gaussian uncertainty is noise.
-.. [3] D. Foreman-Mackey et al., The Astronomical Journal 154 (2017), 220: celerite.
-.. [4] A. C. Aitken, Proceedings of the Royal Society of Edinburgh 55 (1936), 42-48.
 """
 
 import hashlib
@@ -313,91 +306,6 @@ MOST_SAMPLES = 50_000
 """Most readings with autocorrelated noise, which cannot be condensed to fewer nodes."""
 
 
-@dataclass(frozen=True)
-class NoiseModel:
-    """Autocorrelation model of noise, by the shares of its components in the variance."""
-
-    ar1: float
-    """Share of an Ornstein-Uhlenbeck process, AR(1) at uniform sampling."""
-    time_s: float
-    """Its relaxation time."""
-    flicker: float
-    """Share of noise with spectrum 1/f."""
-    proportional: float = 0.0
-    """Share of white noise whose standard deviation is proportional to the reading, on average
-    over the readings. The rest is white noise that is the same everywhere."""
-    walk: float = 0.0
-    """Share of a random walk that begins with the first reading, on average over the readings."""
-
-    @property
-    def white(self) -> float:
-        """Share of white noise that is the same everywhere."""
-        return 1 - self.ar1 - self.flicker - self.proportional - self.walk
-
-
-WEIGHTED = NoiseModel(ar1=0.0, time_s=1.0, flicker=0.0, proportional=1.0)
-"""Independent noise whose standard deviations are given."""
-
-
-class Whitening:
-    """Transforms autocorrelated into white noise of the same variance, and projects nuisance out.
-
-    Sampling times, (n_samples,), ascend. Nuisance are functions that the instrument may have added
-    with any amplitude, uncertain ones those with a random amplitude (`with_uncertain`),
-    (n_functions, n_samples); growing is the standard deviation of the proportional part up to a
-    factor, (n_samples,), required if there is one.
-    """
-
-    def __init__(
-        self,
-        time_s: Array,
-        noise_model: NoiseModel,
-        nuisance: Array,
-        uncertain: Array | None = None,
-        growing: Array | None = None,
-    ) -> None:
-        # Imported here, for loading celerite takes a tenth of a second.
-        from celerite2 import driver
-
-        flicker = flicker_rates(time_s)
-        rates = np.concatenate(([1 / noise_model.time_s], flicker, [0.0]))
-        of_flicker = np.full(len(flicker), noise_model.flicker / len(flicker))
-        shares = np.concatenate(([noise_model.ar1], of_flicker, [noise_model.walk]))
-        self._solve = driver.solve_lower
-        walked = (time_s - time_s[0]) / np.mean(time_s - time_s[0])
-        self._time_s, self._rates = np.ascontiguousarray(time_s, float), rates
-        self._left = np.tile(shares, (len(time_s), 1))
-        right = np.ones_like(self._left)
-        right[:, -1] = walked
-        # White noise keeps the matrix regular, however small its share.
-        diagonal = 1.0 + noise_model.walk * (walked - 1)
-        if growing is not None:
-            diagonal += noise_model.proportional * (growing**2 / np.mean(growing**2) - 1)
-        pivots, self._right = driver.factor(
-            self._time_s, rates, diagonal, self._left, right, np.empty_like(diagonal), right.copy()
-        )
-        self._deviations = np.sqrt(pivots)
-        self.log_determinant = float(np.sum(np.log(pivots)))
-        """Logarithm of the determinant of the covariance matrix, over the mean variance."""
-        if len(nuisance) or uncertain is not None:
-            basis = np.linalg.qr(self._whitened(nuisance).T)[0].T
-            known = nuisance[:0] if uncertain is None else self._whitened(uncertain)
-            nuisance = with_uncertain(basis, known)
-        self.nuisance = nuisance
-        """Whitened functions that are projected out, (n_functions, n_samples)."""
-
-    def __call__(self, rows: Array) -> Array:
-        """Whiten functions of time, shape (..., n_samples), and project the nuisance out."""
-        return without(self.nuisance, self._whitened(rows))
-
-    def _whitened(self, rows: Array) -> Array:
-        columns = np.ascontiguousarray(rows.reshape(-1, rows.shape[-1]).T)
-        solved = self._solve(
-            self._time_s, self._rates, self._left, self._right, columns, np.empty_like(columns)
-        )
-        return (solved / self._deviations[:, None]).T.reshape(rows.shape)
-
-
 def moduli_of(rows: Array, places: Array) -> Array:
     """Return moduli, (..., n_moduli, n_frequencies), of rows of a sweep, (..., n_samples).
 
@@ -413,26 +321,3 @@ def places_of(moduli: Array, places: Array) -> Array:
     stored, lost = moduli[..., 0, :], moduli[..., -1, ::-1]
     parts = [lost] * bool(places[0] < 0) + [stored] * bool(places[-1] > 0)
     return np.concatenate(parts, axis=-1)
-
-
-class PairWhitening:
-    """Turns noise of both moduli of a sweep, correlated at each frequency, into white noise.
-
-    It is C^(-1/2) of the covariance C of each pair, which keeps the moduli apart as far as it can.
-    Places and standard deviations are (n_samples,), the correlation is (n_frequencies,).
-    """
-
-    def __init__(self, places: Array, sd: Array, correlation: Array) -> None:
-        self._places, (first, second) = places, moduli_of(sd, places)
-        shared = correlation * first * second
-        root = first * second * np.sqrt(1 - correlation**2)
-        size = np.sqrt(np.mean(sd**2)) / (root * np.sqrt(first**2 + second**2 + 2 * root))
-        # (C + sqrt(det C)) / sqrt(tr C + 2 sqrt(det C)) is the root of C, and this its inverse.
-        self._parts = size * np.array([[second**2 + root, -shared], [-shared, first**2 + root]])
-        self.nuisance = np.zeros((0, len(sd)))
-        """None."""
-
-    def __call__(self, rows: Array) -> Array:
-        """Whiten rows of a sweep, (..., n_samples); the variance stays the same on average."""
-        moduli = moduli_of(rows, self._places)
-        return places_of(np.einsum("ijn,...jn->...in", self._parts, moduli), self._places)

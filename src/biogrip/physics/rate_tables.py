@@ -25,7 +25,8 @@ from numpy.polynomial import Chebyshev, Polynomial, chebyshev
 from numpy.typing import NDArray
 
 from biogrip.arrays import Array, BoolArray, IntArray
-from biogrip.physics.modes import Modes, respond
+from biogrip.physics.modes import respond
+from biogrip.physics.response import Modes
 
 # Width and degree of wide pieces, and number of short pieces in one for sums and for rows.
 _PIECE_WIDTH, _WIDE_DEGREE = 0.25, 11

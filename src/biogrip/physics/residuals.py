@@ -11,18 +11,20 @@ from biogrip.arrays import Array, parts
 from biogrip.physics.condensed import Condensed
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.instruments import Instrument
-from biogrip.physics.modes import compute_modes, linear_responses, mode_responses
+from biogrip.physics.modes import mode_responses
 from biogrip.physics.noise import estimate_noise, measure_rounding
 from biogrip.physics.protocol import Course
-from biogrip.physics.sample_model import Network, SampleModel
-from biogrip.physics.simulation import (
+from biogrip.physics.response import (
     Grip,
     Ring,
     compute_grip,
+    compute_modes,
     elapsed_s,
+    linear_responses,
     ring,
     ringing_s,
 )
+from biogrip.physics.sample_model import Network, SampleModel
 
 # Most numbers in the rows that are formed at once.
 _MISFIT_NUMBERS_AT_ONCE = 100_000

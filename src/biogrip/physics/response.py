@@ -24,23 +24,33 @@ With inertia, arms ring. E, or Z + 2 b^2 G, times the product of all s + r_j is 
 iteration that finds its roots needs only its quotient with its derivative, a sum over the branches.
 A root is kept as its distance from the nearest branch, so that it has all digits. Starts are the
 rates without inertia, and the ringing of arms on a sample whose Maxwell dampers are rigid.
+
+References
+----------
+.. [1] W. Squire and G. Trapp, SIAM Review 40 (1998), 110-112: derivatives by complex variables.
+.. [2] J. R. R. A. Martins et al., ACM Transactions on Mathematical Software 29 (2003), 245-262.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from itertools import pairwise
-from math import factorial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from biogrip.arrays import Array, ComplexArray
 from biogrip.physics.gripper import Arm, Gripper
-from biogrip.physics.protocol import Course
+from biogrip.physics.modes import sum_of_responses
+from biogrip.physics.protocol import Course, evaluate
 from biogrip.physics.roots import Zeros, distances, find_zeros, interlaced_zeros, spread_starts
-from biogrip.physics.sample_model import Network
+from biogrip.physics.sample_model import Network, SampleModel
 
 LEFT, RIGHT = 0, 1
+
+_COMPLEX_STEP = 1e-30
+# Rate at which a bare damper forgets, in 1/s; its force is c times the rate of the deformation.
+_RATE_OF_A_DAMPER = 1e30
 
 # Least difference of the arms: the branch of equal arms has no effect, but a mode.
 _LEAST_DIFFERENCE = 1e-30
@@ -67,7 +77,7 @@ def step_response(
 
     With `inertia`, arms ring for milliseconds. Without, all rates are real and negative, and a
     parallel damper makes the force jump with the torque. The jaw `force`, in N per N m, takes the
-    place of an arm.
+    place of an arm. An infinitesimal imaginary part of elements is carried through.
     """
     arms = Arms(gripper)
     impedance = arms.with_sample(network)
@@ -78,50 +88,23 @@ def step_response(
         weights: NDArray[Any] = ringing.weights(force=force)
     else:
         rates = -zeros.values.T
-        numerators = arms.force(zeros) if force else arms.rotations(zeros)[0]
+        numerators = arms.force(zeros) if force else arms.rotations(zeros)
         weights = -numerators / impedance.steepness(zeros)
     return StepResponse(*map(np.ascontiguousarray, (rates, np.moveaxis(weights, -1, 0))))
 
 
-def weights_of_loads(gripper: Gripper, network: Network) -> Array:
-    """Compute weights of the modes without inertia under steps of either arm's load.
-
-    In rad per N m, (n, n_arms, n_loads, n_modes); loads are that of both arms and, where these
-    differ, what that of the left arm exceeds that of the right one by. Of equal arms, only that of
-    both, and one stands for both.
-    """
-    arms = Arms(gripper)
-    impedance = arms.with_sample(network)
-    zeros = impedance.zeros()
-    numerators = arms.rotations(zeros)[0][:, None]
-    if arms.alike:
-        numerators = numerators[:1]
-    else:
-        numerators = np.concatenate((numerators, arms.rotations_apart(zeros)[:, None]), axis=1)
-    return np.ascontiguousarray(np.moveaxis(-numerators / impedance.steepness(zeros), -1, 0))
-
-
 def superpose(
-    response: StepResponse,
-    course: Course,
-    time_s: Array,
-    arm: int = LEFT,
-    *,
-    rate: bool = False,
+    response: StepResponse, course: Course, time_s: Array, arm: int = LEFT, *, rate: bool = False
 ) -> Array:
-    """Compute the response to a protocol, or its rate, (n, n_times), at any times.
+    """Compute the response to a protocol, or its rate, (n, n_times), at ascending times.
 
-    Of a gripper, it is the closing rotation of an arm in rad. Responses to changes superpose. A
-    step response starts at zero, so h(t) = sum_j w_j (e^(p_j t) - 1), which loses no digits to the
-    constant if a sample creeps far from its rest. Ramps and parabolas are its integrals.
+    Of a gripper, it is the closing rotation of an arm in rad. At the very instant of a step the
+    rate is what precedes it.
     """
-    total = np.zeros((len(response.rates), len(time_s)))
-    weights, rates = response.weights[:, arm], response.rates[:, :, None]
-    for start, order, height in course.jumps:
-        after = time_s >= start
-        growth = _mode_growth(order - rate, rates, time_s[after] - start)
-        total[:, after] += np.einsum("nj,njt->nt", height * weights, growth).real
-    return total
+    rates, weights = response.rates, response.weights[:, [arm]]
+    if rate:
+        weights, course = rates[:, None] * weights, replace(course, deforms=True)
+    return sum_of_responses(rates, weights, course, time_s)[:, 0]
 
 
 def linear_jaw_force(
@@ -129,49 +112,97 @@ def linear_jaw_force(
 ) -> Array:
     """Compute the jaw force of samples in N, (n, n_times); at a step, what follows it."""
     response = step_response(gripper, network, inertia=inertia, force=True)
-    force = np.zeros((len(response.rates), len(time_s)))
-    rates, weights = response.rates[:, :, None], response.weights[:, 0]
-    static = Arms(gripper).force_at_rest(network)
-    for start, order, height in course.jumps:
-        after = time_s >= start
-        elapsed = time_s[after] - start
-        z = rates * elapsed
-        growth = elapsed**order * (phi_functions(order, z)[order] if order else np.exp(z))
-        rest = height * static[:, None] * elapsed**order / factorial(order)
-        force[:, after] += rest + np.einsum("nj,njt->nt", height * weights, growth).real
-    return force
+    at_rest = Arms(gripper).force_at_rest(network)[:, None] * evaluate(course, time_s)
+    as_deformation, after = replace(course, deforms=True), np.nextafter(time_s, np.inf)
+    given = response.rates, response.weights, as_deformation, after
+    return at_rest + sum_of_responses(*given)[:, 0]
 
 
-def _mode_growth(order: int, rates: NDArray[Any], elapsed: Array) -> NDArray[Any]:
-    """Return a mode's response over its weight to t^order/order!; for order -1, to an impulse."""
-    z = rates * elapsed
-    if order < 0:
-        return rates * np.exp(z)
-    if order == 0:
-        return np.expm1(z)
-    return rates * elapsed ** (order + 1) * phi_functions(order + 1, z)[-1]
+def simulated_response(gripper: Gripper, network: Network, course: Course, time_s: Array) -> Array:
+    """Simulate what is read at ascending times, (n, n_times), with inertia, by corrected (4)-(6).
 
-
-def phi_functions(most: int, z: NDArray[Any]) -> list[NDArray[Any]]:
-    """Compute phi_n(z) = (e^z - sum_{k<n} z^k/k!) / z^n for n = 0 ... most, at least 1.
-
-    Near zero, where that would cancel, the last is a series, and the others follow from it (M.
-    Hochbruck and A. Ostermann, Acta Numerica 19 (2010), 209-286).
+    Of a gripper that is the closing rotation of the left arm in rad.
     """
-    small = np.abs(z) < 1.0
-    near, far = np.where(small, z, 0), np.where(small, 1, z)
-    series = np.zeros_like(near)
-    for k in range(18, -1, -1):
-        series = series * near + 1 / factorial(k + most)
-    value = np.expm1(far) / far
-    phis = [np.exp(z), value]
-    for n in range(1, most):
-        value = (value - 1 / factorial(n)) / far
-        phis.append(value)
-    for n in range(most, 0, -1):
-        phis[n] = np.where(small, series, phis[n])
-        series = series * near + 1 / factorial(n - 1)
-    return phis
+    if course.deforms:
+        rates, weights = elements_of(network)
+        return sum_of_responses(rates, weights[:, None], course, time_s)[:, 0]
+    return superpose(step_response(gripper, network, inertia=gripper.has_inertia), course, time_s)
+
+
+class Modes(NamedTuple):
+    """Step responses of n samples, and their derivatives by the log-parameters."""
+
+    rates: Array
+    """In 1/s, (n, n_modes), negative."""
+    weights: Array
+    """(n, n_modes): the reading over what is controlled."""
+    rate_slopes: Array
+    """(n, n_parameters, n_modes)."""
+    weight_slopes: Array
+    """(n, n_parameters, n_modes)."""
+
+
+def compute_modes(
+    gripper: Gripper,
+    model: SampleModel,
+    course: Course,
+    parameters: Array,
+    *,
+    slopes: bool = True,
+) -> Modes:
+    """Compute the modes of samples, all positive, (n, n_parameters), and their derivatives.
+
+    A parameter with a relative imaginary part of 1e-30 carries its derivative through the
+    arithmetic without changing the real part: the complex step [1]_, [2]_.
+    """
+    count = parameters.shape[1] if slopes else 0
+    if slopes:
+        # After the samples, copies with each of their parameters tilted into the complex plane.
+        factors = np.ones((count + 1, 1, count), dtype=np.complex128)
+        factors[1:, 0].imag = _COMPLEX_STEP * np.eye(count)
+        parameters = (parameters * factors).reshape(-1, count)
+    network = model.network(parameters)
+    if course.deforms:
+        rates, weights = elements_of(network)
+    else:
+        response = step_response(gripper, network, inertia=False)
+        rates, weights = response.rates, response.weights[:, LEFT]
+    both = [of.reshape(count + 1, -1, of.shape[1]) for of in (rates, weights)]
+    of_samples = (np.ascontiguousarray(of[0].real) for of in both)
+    of_slopes = (of[1:].imag.swapaxes(0, 1) / _COMPLEX_STEP for of in both)
+    return Modes(*of_samples, *map(np.ascontiguousarray, of_slopes))
+
+
+def sum_of_modes(modes: Modes, course: Course, time_s: Array) -> Array:
+    """Return what samples show by all their modes, see `linear_responses`."""
+    # Sums of responses of modes, w g, and their derivatives, d(w g) = dw g + w dr dg/dr.
+    by_response = np.concatenate((modes.weights[:, None], modes.weight_slopes), axis=1)
+    by_slope = np.zeros_like(by_response)
+    by_slope[:, 1:] = modes.weights[:, None] * modes.rate_slopes
+    mixing = np.concatenate((by_response, by_slope), axis=2)
+    return sum_of_responses(modes.rates, mixing, course, time_s)
+
+
+def linear_responses(
+    gripper: Gripper, model: SampleModel, course: Course, time_s: Array, parameters: Array
+) -> Array:
+    """Compute what is read in the linear model, corrected eqs. (4)-(6), and d/d log p of it.
+
+    Times, (n_times,), ascend; parameters, (n, n_parameters), are positive. Returns readings and
+    their derivatives, (n, 1 + n_parameters, n_times).
+    """
+    return sum_of_modes(compute_modes(gripper, model, course, parameters), course, time_s)
+
+
+def elements_of(network: Network) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return rates and stiffnesses of elements side by side, (n, n_modes); of bare ones last."""
+    bare = np.stack((network.k_p, _RATE_OF_A_DAMPER * network.c_p), axis=1)
+    fixed = np.broadcast_to([0.0, -_RATE_OF_A_DAMPER], bare.shape)
+    # A branch so weak that its numbers underflow is none.
+    there = network.c.real > 0
+    rates = -network.k / np.where(there, network.c, 1.0)
+    weights = np.where(there, network.k, 0.0)
+    return np.concatenate((rates, fixed), axis=1), np.concatenate((weights, bare), axis=1)
 
 
 @dataclass(frozen=True)
@@ -189,9 +220,10 @@ class Impedance:
         """Return the rates of modes without inertia."""
         return interlaced_zeros(self.weights, self.rates, self.level)
 
-    def steepness(self, zeros: Zeros) -> Array:
+    def steepness(self, zeros: Zeros) -> NDArray[Any]:
         """Return S at rates of modes, (n_modes, n)."""
-        x, steepness = zeros.values, np.zeros_like(zeros.pole)
+        x = zeros.values
+        steepness = np.zeros_like(x)
         for weight, rate in zip(self.weights, self.rates, strict=True):
             steepness += weight * (x / zeros.from_pole(rate)) ** 2
         return steepness
@@ -228,28 +260,15 @@ class Arms:
             c.prod() / c.sum() + b_2 * network.c_p,
         )
 
-    def rotations(self, zeros: Zeros) -> tuple[Array, Array]:
-        """Return N of the rotations of modes, (n_arms, n_modes, n), and dN/dx."""
+    def rotations(self, zeros: Zeros) -> NDArray[Any]:
+        """Return N of the rotations of modes, (n_arms, n_modes, n)."""
         if self.alike:
-            half = np.full((2, *zeros.pole.shape), 0.5)
-            return half, np.zeros_like(half)
+            return np.full((2, *zeros.pole.shape), 0.5)
         left, right = self._c / self._c.sum()
-        away = zeros.from_pole(np.asarray(self._rate))
-        share = self._chi / self._c.sum() / away
-        slope = share / away
-        return np.array([right - share, left + share]), np.array([slope, -slope])
+        share = self._chi / self._c.sum() / zeros.from_pole(np.asarray(self._rate))
+        return np.array([right - share, left + share])
 
-    def rotations_apart(self, zeros: Zeros) -> Array:
-        """Return N of the rotations under what the left load exceeds the right one by.
-
-        With these phi_2 = [Z_4/(Z_2 + Z_4) tau_2 + b^2 G/(Z_2 + Z_4) (tau_2 - tau_4)] / H. Returns
-        (n_arms, n_modes, n).
-        """
-        of_right, of_left = self.rotations(zeros)[0]
-        through = -of_left * of_right
-        return np.array([through, -of_left - through])
-
-    def force(self, zeros: Zeros) -> Array:
+    def force(self, zeros: Zeros) -> NDArray[Any]:
         """Return N of the jaw force of modes, (1, n_modes, n)."""
         (c_2, c_4), b = self._c, self._lever_m
         if self.alike:
@@ -391,3 +410,99 @@ def _impedance_of_arm(arm: Arm, s: ComplexArray) -> ComplexArray:
     """Return the impedance of a free arm."""
     k, c, inertia = _polynomial(arm)
     return k + s * (c + s * inertia)
+
+
+# Forces below this share of the largest one are rounding errors.
+_LEAST_FORCE = 1e-9
+_TIMES_OF_PHASE, _MOST_TIMES = 200, 20_000
+
+
+@dataclass(frozen=True)
+class Grip:
+    """The force of the jaws on a sample that they hold throughout a protocol."""
+
+    largest_N: float
+    """Largest force with which the jaws press."""
+    lowest_N: float
+    """Lowest force, negative if the jaws pull, else after the largest one."""
+    lowest_at_s: float
+    """Time of the lowest force."""
+    pulls_from_s: float | None
+    """Time from which the jaws would have to pull; None if they press throughout."""
+
+    def words(self) -> str | None:
+        """Describe from when and how hard the jaws would have to pull, if they would."""
+        if self.pulls_from_s is None:
+            return None
+        return (
+            f"the jaws would have to pull the sample from {self.pulls_from_s:.4g} s on "
+            f"(with {-1e6 * self.lowest_N:.2g} µN at {self.lowest_at_s:.4g} s, where they press "
+            f"with {1e6 * self.largest_N:.2g} µN at most)"
+        )
+
+
+def compute_grip(gripper: Gripper, network: Network, course: Course) -> Grip:
+    """Compute the extreme forces of the jaws on the first sample, without inertia."""
+
+    def force_at(time_s: Array) -> Array:
+        return linear_jaw_force(gripper, network, course, time_s, inertia=False)[0]
+
+    return extreme_forces(force_at, course)
+
+
+def extreme_forces(force_at: Callable[[Array], Array], course: Course) -> Grip:
+    """Find the extreme forces of the jaws, a function of ascending times, over a course."""
+    # Dense after every change of the load.
+    lengths = np.diff(course.time_s, append=course.end_s)
+    count = max(3, min(_TIMES_OF_PHASE, _MOST_TIMES // len(lengths)))
+    after = np.outer(lengths, np.geomspace(1e-9, 1.0, count)[:-1])
+    time_s = np.unique(np.append(course.time_s[:, None] + after, course.end_s))
+    force = force_at(time_s)
+    least_shown = _LEAST_FORCE * float(np.abs(force).max()) or 1.0
+    shown = np.round(force / least_shown)
+    most, negative = int(np.argmax(shown)), np.flatnonzero(shown < 0)
+    first = 0 if len(negative) else most
+    least = first + int(np.argmin(shown[first:]))
+    return Grip(
+        float(shown[most] * least_shown),
+        float(shown[least] * least_shown),
+        float(time_s[least]),
+        float(time_s[negative[0]]) if len(negative) else None,
+    )
+
+
+# A ring of exp(-36) is lost in rounding.
+_EFOLDS_OF_RING = 36.0
+
+
+@dataclass(frozen=True)
+class Ring:
+    """Ringing of the arms that shows in a trace."""
+
+    largest: float
+    """Largest change of a reading by inertia, in standard deviations of the noise."""
+    lasts_s: float
+    """Time after a change of the torque of the last reading that would have to be left out."""
+
+
+def ringing_s(gripper: Gripper) -> float:
+    """Return the time in s after which the ringing of the arms has decayed below rounding.
+
+    An arm loses energy to its own damper, whatever else it moves: the envelope of its ringing
+    falls at least like exp(-c t / (2 I)).
+    """
+    arms = gripper.left, gripper.right
+    return _EFOLDS_OF_RING * max(2 * arm.inertia_kgm2 / arm.damping_Nms_per_rad for arm in arms)
+
+
+def elapsed_s(course: Course, time_s: Array) -> Array:
+    """Return the times since the last change of the torque, (n_times,)."""
+    last = np.maximum(course.changes_s.searchsorted(time_s, side="right") - 1, 0)
+    return time_s - course.changes_s[last]
+
+
+def ring(gripper: Gripper, network: Network, course: Course, time_s: Array) -> Array:
+    """Compute the change of the left arm's rotation by inertia, (n, n_times) in rad."""
+    responses = (step_response(gripper, network, inertia=inertia) for inertia in (True, False))
+    with_it, without = (superpose(response, course, time_s) for response in responses)
+    return with_it - without

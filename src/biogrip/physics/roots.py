@@ -125,24 +125,24 @@ class Zeros:
         """Zeros, (n_zeros, n), ascending."""
         return self.pole + self.beyond
 
-    def from_pole(self, pole: Array) -> NDArray[Any]:
+    def from_pole(self, pole: NDArray[Any]) -> NDArray[Any]:
         """Return distances of zeros from a pole of each function, (n,), without cancellation."""
         return (self.pole - pole) + self.beyond
 
 
-def interlaced_zeros(weights: NDArray[Any], poles: Array, level: NDArray[Any]) -> Zeros:
+def interlaced_zeros(weights: NDArray[Any], poles: NDArray[Any], level: NDArray[Any]) -> Zeros:
     """Return the zeros of sum_j w_j / (x - p_j) - b: each above its own pole and below the next.
 
     The zeros of a function are bitwise independent of the other functions. Weights and poles are
-    (n_poles, n), levels (n,). Weights and levels are positive; an imaginary part, far smaller than
-    the real one, carries a derivative. Poles are real and ascend from zero.
+    (n_poles, n), levels (n,). Weights and levels are positive, poles ascend from zero; an imaginary
+    part, far smaller than the real one, carries a derivative.
     """
-    if not (np.iscomplexobj(weights) or np.iscomplexobj(level)):
+    if not any(map(np.iscomplexobj, (weights, poles, level))):
         return _real_zeros(weights, poles, level)
     # Samples that differ only in which derivative they carry have the same real parts.
-    real = np.concatenate((weights.real, poles, level.real[None]))
+    real = np.concatenate((weights.real, poles.real, level.real[None]))
     _, first, which = np.unique(real, axis=1, return_index=True, return_inverse=True)
-    of_some = _real_zeros(weights.real[:, first], poles[:, first], level.real[first])
+    of_some = _real_zeros(weights.real[:, first], poles.real[:, first], level.real[first])
     zeros = Zeros(of_some.pole[:, which], of_some.beyond[:, which])
     # A Newton step is exact for an infinitesimal change of the weights.
     change = -np.imag(level) * np.ones_like(zeros.pole)
@@ -151,7 +151,7 @@ def interlaced_zeros(weights: NDArray[Any], poles: Array, level: NDArray[Any]) -
         distance = zeros.from_pole(pole)
         term = weight / distance
         change += term.imag
-        slope -= term.real / distance
+        slope -= term.real / distance.real
     return Zeros(zeros.pole, zeros.beyond - 1j * change / slope)
 
 

@@ -210,10 +210,6 @@ class MeasurementBlock(Block):
     or not, then fits an offset and a drift along, unless they are false. By default white."""
     noise: Noise
 
-    # No key.
-    by_options = False
-    """False if keys of the config say all; used in messages."""
-
     @property
     def coloured(self) -> bool:
         """True if the noise model is more than white noise."""
@@ -282,11 +278,16 @@ class MeasurementBlock(Block):
         return self.named[self.readings[0]]
 
     def said_by(self, *keys: str) -> str:
-        """Return the options or config keys that say something, for messages."""
-        if self.by_options:
-            return " and ".join(map(_option, keys))
-        values = [f"{key}: {_BY_SET.get(key, 'UNIT')}".removesuffix(": UNIT") for key in keys]
-        return f"{' and '.join(values)} under measurement"
+        """Return the options of the command that say keys, for messages."""
+        return " and ".join(map(_option, keys))
+
+    def unit_key(self, key: str) -> str:
+        """Return the key that says the unit of a column of `named`."""
+        if key in (self.axis, "load"):
+            return f"{key}_unit"
+        if self.partner and key == self.partner.name:
+            return "partner_unit"
+        return "rotation_unit" if self.rotation else "reading_unit"
 
     @property
     def readings(self) -> list[str]:
@@ -394,12 +395,6 @@ class MeasurementBlock(Block):
 
 UNREAD = MeasurementBlock(rate_Hz=1.0, noise=Noise("gaussian", 0.0, "peak"))
 """What a recording of no file was read by."""
-
-
-class ByOptions(MeasurementBlock):
-    """A measurement whose keys are set by options of the command, as messages then say."""
-
-    by_options = True
 
 
 def _option(key: str) -> str:

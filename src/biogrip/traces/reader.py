@@ -2,7 +2,6 @@
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from math import isfinite
 from pathlib import Path
 from shlex import quote
 from typing import Any
@@ -13,7 +12,7 @@ import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.digits import counted, plain
 from biogrip.errors import BiogripError, nearest
-from biogrip.physics.instruments import INSTRUMENTS, PHASE, ROTATION, VISCOSITY
+from biogrip.physics.instruments import INSTRUMENTS, PHASE, VISCOSITY
 from biogrip.physics.protocol import joined
 from biogrip.terminal import visible
 from biogrip.traces.columns import AXES, listed, place, plain_name, shortened, unit_of
@@ -23,24 +22,23 @@ from biogrip.traces.tables import (
     DAY_S,
     Sheet,
     Table,
-    find_marks,
+    decimal_mark,
     find_tables,
     is_clock,
-    number_or_inf,
+    is_number,
+    number_reader,
     numbers_of,
     read_sheet,
-    seconds_or_inf,
 )
 
 FEWEST_SAMPLES = 5
 _PLURALS = {"time": "times", "frequency": "frequencies"}
 # Relative to the last time: smaller steps are damaged numbers, not a clock's.
 _SHORTEST_STEP = 1e-18
-_SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", BLANKS: "blanks"}
-_MARKS = {".": "point", ",": "comma"}
+_IN_WORDS = {",": "commas", ";": "semicolons", "\t": "tabs", BLANKS: "blanks"}
+_DECIMAL = {".": "point", ",": "comma"}
 # More seconds than there are in hours, minutes and seconds without a date.
 _DATED_S = 1e10
-_THOUSANDS = {".": "points", ",": "commas", " ": "blanks or apostrophes", "": None}
 
 
 def form_in_words(path: Path, form: Mapping[str, Any]) -> str:
@@ -122,13 +120,12 @@ class Recording:
             rows = f"{counted(self.gaps, 'row')} of {len(self.time_s) + self.gaps}"
             said.append(f"Left out for want of a number: {rows}.")
         form = self.form
-        if form.get("averaged"):
-            axis = _PLURALS[self.read.axis]
-            said.append(f"Averaged at repeated {axis}: {counted(form['averaged'], 'reading')}.")
-        if form.get("outside"):
-            said.append(f"Left out by from_s and until_s: {counted(form['outside'], 'reading')}.")
-        if form.get("others"):
-            said.append(f"Left out, for rows asks for others: {counted(form['others'], 'row')}.")
+        counts = {
+            "averaged": f"Averaged at repeated {_PLURALS[self.read.axis]}",
+            "outside": "Left out by from_s and until_s",
+            "others": "Left out, for rows asks for others",
+        }
+        said += [f"{counts[key]}: {counted(form[key], 'row')}." for key in counts if key in form]
         if self.load_noise:
             said.append(
                 f"Smoothed out of {self.read.load}, since the readings do not follow it: what "
@@ -159,10 +156,10 @@ class Recording:
 def is_usual(recording: Recording) -> bool:
     """Return True of arrays, and of a file with a table as biogrip itself would write."""
     form, columns = recording.form, recording.read
-    odd = ("units_line", "block", "preamble", "averaged", "outside", "others", "thousands")
+    odd = ("units_line", "block", "preamble", "averaged", "outside", "others", "unclear", "clock")
     return recording.path is None or (
         (form["encoding"], form["separator"], form["decimal"]) == ("UTF-8", "commas", "point")
-        and not any(key in form for key in (*odd, "unclear", "clock"))
+        and not any(key in form for key in odd)
         and columns.block is None
         and columns.load is None
         and (columns.axis_column, columns.reading_column)
@@ -175,9 +172,8 @@ def read_recording(path: Path, columns: MeasurementBlock) -> Recording:
 
     The header is the line that has the columns, or has a row of units below it; of several such
     tables, ``block`` says which, or which are one test. With semicolons or tabs between cells
-    numbers may have a decimal comma; one table has one decimal mark, and other marks are between
-    thousands. Times may be hours:minutes:seconds, after a date or not. Other columns may hold
-    anything.
+    numbers may have a decimal comma; one table has one decimal mark, and none between thousands.
+    Times may be hours:minutes:seconds, after a date or not. Other columns may hold anything.
 
     An empty cell, ``nan``, ``NA``, ``N/A``, ``#N/A``, ``#NV`` (in any case) or ``-`` is a gap. Its
     row is left out and counted; nothing is interpolated. A `BiogripError` has file, line and column
@@ -209,7 +205,7 @@ def read_recording(path: Path, columns: MeasurementBlock) -> Recording:
     recording = _checked(path, columns, units, values[chosen], lines[chosen])
     form = {
         "encoding": sheet.encoding,
-        "separator": _SEPARATORS[sheet.separator],
+        "separator": _IN_WORDS[sheet.separator],
         **form,
         "header_line": int(sheet.numbers[table.at]) or None,
         "units_line": None if table.units_at is None else int(sheet.numbers[table.units_at]),
@@ -269,19 +265,14 @@ def _about_rise(
 
 def _read_block(path: Path, sheet: Sheet, table: Table, columns: MeasurementBlock) -> _TablePart:
     header_line = int(sheet.numbers[table.at]) or None
-    axis, rows = columns.axis_column, slice(table.first, table.end)
-    times = [cell for i in table.indices(axis)[:1] for cell in sheet.cells[rows, i].tolist()]
-    clock = is_clock(times)
-    if ":" in "".join(times[:1]) and not clock:
-        raise BiogripError(
-            f"{place(path, sheet.numbers[table.first], axis)}: found '{shortened(times[0])}'; "
-            "allowed are numbers, or hh:mm:ss, alone or after a date as 2026-11-25 or 25.11.2026."
-        )
+    rows = slice(table.first, table.end)
+    times = [cell for i in table.indices(columns.axis_column)[:1] for cell in sheet.cells[rows, i]]
     if table.end <= table.first and table.common(columns) == len(columns.named):
         raise BiogripError(
             f"{place(path, header_line)}: found names of columns without rows of numbers below "
             "them, allowed is a table with rows."
         )
+    clock = is_clock(times)
     indices, units = _columns_of(path, header_line, table, columns, clock=clock)
     values, form = _numbers(path, sheet, table, indices, clock=clock)
     chosen = _chosen(path, sheet, table, columns)
@@ -417,12 +408,6 @@ def _no_column(
     return f"{place(path, line)}: there is no column '{visible(column)}'. {there}"
 
 
-def _as_in(names: Sequence[str]) -> str:
-    """Return the option for a column that is named after what is read, or nothing."""
-    found = ((name, own) for name in INSTRUMENTS for own in names if own.lower().startswith(name))
-    return next((f", as --reading {quote(f'{name}={own}')}" for name, own in found), "")
-
-
 def _both_moduli(
     path: Path | None, columns: MeasurementBlock, units: list[str], values: Array, lines: IntArray
 ) -> tuple[Array, Array]:
@@ -452,60 +437,56 @@ def _columns_of(
     path: Path, line: int | None, table: Table, columns: MeasurementBlock, *, clock: bool
 ) -> tuple[list[int], list[str]]:
     """Return where the columns to read are in a table, and their units; or list what is wrong."""
-    found: dict[int, str] = {}
-    units: list[str] = []
-    problems: list[str] = []
-    ways = columns.said_by(*columns.named)
-    example = _as_in(table.names) if columns.by_options else ""
-    if not any(table.indices(it) for it in columns.named.values()) and all(
-        isfinite(number_or_inf(name.replace(",", "."))) for name in table.names if name
-    ):
-        raise BiogripError(
-            f"{place(path, line)}: found numbers, allowed is a line with the names of the columns; "
-            f"or say their numbers, 1 to {len(table.names)}, by {ways}, and their units."
-        )
+    indices, units, problems = list[int](), list[str](), list[str]()
     for key, column in columns.named.items():
-        same, where = table.indices(column), place(path, line, column)
+        same = table.indices(column)
         if not same:
             said = _no_column(path, line, column, table.names, columns.named.values())
-            problems.append(f"{said} Say which is which by {ways}{example}.")
+            problems.append(f"{said} Say which is which by {_ways(table.names, columns)}.")
             continue
         if len(same) > 1:
-            problems += [f"{where}: found {len(same)} columns of this name, allowed is one."]
-        elif same[0] in found:
-            text = f"found {found[same[0]]} and {key} in one column, allowed are two."
-            problems += [f"{where}: {text}"]
-        found[same[0]] = key
+            where = place(path, line, column)
+            problems.append(f"{where}: found {len(same)} columns of this name, allowed is one.")
+        indices.append(same[0])
         below = table.units[same[0]] if table.units else ""
         try:
             timed = clock and key == columns.axis
             units.append("s" if timed else _unit(path, key, below, columns, units))
         except BiogripError as error:
             problems.append(str(error))
+    if not problems and len({*indices}) < len(indices):
+        of = " and ".join(columns.named)
+        problems.append(f"{place(path, line)}: found {of} in one column, allowed are several.")
     if problems:
         raise BiogripError("\n".join(problems))
-    return list(found), units
+    return indices, units
+
+
+def _ways(names: Sequence[str], columns: MeasurementBlock) -> str:
+    """Return what says the columns of a file, with an example where a name tells its quantity."""
+    ways = columns.said_by(*columns.named)
+    if all(map(is_number, filter(None, names))):
+        return f"{ways}, where no line has names by numbers, 1 to {len(names)}"
+    alike = (
+        (read, name) for read in INSTRUMENTS for name in names if name.lower().startswith(read)
+    )
+    examples = (f", as --reading {quote(f'{read}={name}')}" for read, name in alike)
+    return ways + next(examples, "")
 
 
 def _unit(
     path: Path | None, key: str, below: str, columns: MeasurementBlock, units: list[str]
 ) -> str:
     """Return the unit of a column; standard deviations have that of the readings before them."""
-    read, allowed = columns.instrument.read, columns.units_of(key)
-    unit_key = "rotation_unit" if read == ROTATION else "reading_unit"
-    given = columns.rotation_unit or columns.reading_unit
-    if key == columns.axis:
-        unit_key, given = f"{key}_unit", columns.time_unit or columns.frequency_unit
-    elif columns.partner and key == columns.partner.name:
-        unit_key = "partner_unit"
-        given = columns.partner_unit or (given if allowed == read.units else None)
-    elif key == "load":
-        unit_key, given = "load_unit", columns.load_unit
-    elif key in ("sd", "loss_sd") and len(units) > 1:
+    unit_key, allowed = columns.unit_key(key), columns.units_of(key)
+    given = getattr(columns, unit_key)
+    if unit_key == "partner_unit" and allowed == columns.instrument.read.units:
+        given = given or columns.reading_unit
+    if key in ("sd", "loss_sd") and len(units) > 1:
         given = units[1]
-    scale = columns.load_scale if key == "load" else columns.scale
-    said_by = columns.said_by(unit_key), below
-    return unit_of(path, columns.named[key], given, allowed, *said_by, scaled=scale is not None)
+    scaled = (columns.load_scale if key == "load" else columns.scale) is not None
+    said_by = columns.said_by(unit_key)
+    return unit_of(path, columns.named[key], given, allowed, said_by, below, scaled=scaled)
 
 
 def _numbers(
@@ -516,43 +497,28 @@ def _numbers(
     If the first column has a clock's times, they are in s.
     """
     rows, width = slice(table.first, table.end), len(table.names)
-    cells, lines = sheet.cells[rows], sheet.numbers[rows]
-    for index in indices:
-        for row in np.flatnonzero(sheet.widths[rows] <= index)[:1]:
-            raise BiogripError(
-                f"{place(path, lines[row], table.names[index])}: found only "
-                f"{counted(sheet.widths[rows][row], 'cell')} in the row, allowed are the header's "
-                f"{width}."
-            )
+    cells, lines, widths = sheet.cells[rows], sheet.numbers[rows], sheet.widths[rows]
     # Empty cells at the end are common.
-    for row in np.flatnonzero(np.any(cells[:, width:] != "", axis=1))[:1]:
+    wrong = (widths <= max(indices)) | np.any(cells[:, width:] != "", axis=1)
+    for row in np.flatnonzero(wrong)[:1]:
         raise BiogripError(
-            f"{place(path, lines[row])}: found {counted(sheet.widths[rows][row], 'cell')} in the "
-            f"row, allowed are the header's {width}. A decimal comma needs semicolons or tabs as "
-            "separators."
+            f"{place(path, lines[row])}: found {counted(widths[row], 'cell')} in the row, allowed "
+            f"are the header's {width}. A decimal comma needs semicolons or tabs as separators."
         )
-    numbers = cells[:, indices[clock:]]
-    marks = find_marks(numbers.ravel().tolist(), sheet.separator)
-    if not marks.decimal:
-        one, other = marks.cells
-        row, column = np.argwhere(numbers == other)[0]
-        raise BiogripError(
-            f"{place(path, lines[row], table.names[indices[clock:][column]])}: found '{other}' "
-            f"beside '{one}', of which nothing tells which has the decimal mark; allowed is one "
-            "decimal mark in a table."
-        )
+    decimal, unclear = decimal_mark(cells[:, indices[clock:]].ravel().tolist(), sheet.separator)
     values = np.empty((len(cells), len(indices)))
     for column, index in enumerate(indices):
-        number = seconds_or_inf if clock and column == 0 else marks.number
-        values[:, column] = np.fromiter(map(number, cells[:, index].tolist()), float, len(cells))
+        of_column = cells[:, index].tolist()
+        number = number_reader(of_column, decimal)
+        values[:, column] = np.fromiter(map(number, of_column), float, len(cells))
         for row in np.flatnonzero(np.isinf(values[:, column]))[:1]:
             raise BiogripError(
                 f"{place(path, lines[row], table.names[index])}: found "
                 f"'{shortened(cells[row, index])}', allowed is a finite number, or nan, NA, N/A, - "
-                "or nothing where there is none."
+                f"or nothing where there is none; numbers have a decimal {_DECIMAL[decimal]}, "
+                "times may be hh:mm:ss, after a date as 2026-11-25 or not."
             )
-    form = {"decimal": _MARKS[marks.decimal], "thousands": _THOUSANDS[marks.thousands]}
-    form |= {"unclear": "".join(marks.cells) or None}
+    form = {"decimal": _DECIMAL[decimal], "unclear": unclear or None}
     if clock:
         form["clock"] = "hours:minutes:seconds"
         if np.nanmin(values[:, 0]) > _DATED_S:
@@ -628,9 +594,10 @@ def _check_conditions(
     said = f"{place(path)}: found {_PLURALS[columns.axis]} again and again"
     if condition:
         there = (f"'{name}' ({listed(values, 5)})" for name, values in condition.items())
+        ways = (f"--rows {quote(f'{name}={values[0]}')}" for name, values in condition.items())
         raise BiogripError(
             f"{said}, in rows that {' and '.join(there)} tells apart; allowed are rows of one "
-            f"condition, as by {_option_of_rows(columns, condition)}."
+            f"condition, as by {' '.join(ways)}."
         )
     if sweeps and not columns.average_repeated:
         raise BiogripError(
@@ -638,13 +605,6 @@ def _check_conditions(
             "allowed are rows of one, in a file of their own or with a column that tells them "
             "apart."
         )
-
-
-def _option_of_rows(columns: MeasurementBlock, condition: Mapping[str, Sequence[str]]) -> str:
-    pairs = {name: values[0] for name, values in condition.items()}.items()
-    if columns.by_options:
-        return " ".join(f"--rows {quote(f'{name}={value}')}" for name, value in pairs)
-    return f"rows: {{{', '.join(f'{name}: {value}' for name, value in pairs)}}} under measurement"
 
 
 def _load(

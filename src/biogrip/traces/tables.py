@@ -10,12 +10,12 @@ cells; and a table without names has numbers of columns.
 import csv
 import re
 from codecs import BOM_UTF16_BE, BOM_UTF16_LE
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from datetime import date
+from datetime import datetime, timedelta
 from itertools import groupby, pairwise
 from math import inf, isfinite, nan
-from operator import eq
 from pathlib import Path
 from typing import Any
 
@@ -45,8 +45,7 @@ _LINE_END = re.compile(r"\r\n|\r|\n")
 # Empty lines and comments; #REF!, #DIV/0! or #NAME? followed by a separator are cells.
 _LEFT_OUT = re.compile(r" *(?:$|#(?!(?:[A-Z0-9/_]+[!?]|N/A|NV)\s*[,;\t]))")
 _COMMENT = re.compile(r"\s*(?:[#%]+|//+)[ \t]*")
-_BEFORE_NAMES = re.compile(r"(?:columns|names|fields|header)\s*[:=]\s*", re.I)
-_BEFORE_UNITS = re.compile(r"units?\s*[:=]\s*", re.I)
+_PREFIX = re.compile(r"[^\W\d]\w*\s*[:=]\s*")
 # Cells between blanks: quoted, or with a unit in brackets after a blank.
 _CELL = re.compile(r'"[^"]*"|[^\s"]+(?:[ \t]+[\[(][^\])\s]*[\])])?')
 _OTHERWISE = re.compile(r"[,;\t][\"\s]|[\"\s][,;\t]")
@@ -58,11 +57,8 @@ _ROW = re.compile(r'[\s",;]*[-+]?[.\d][\d.,:eE+-]*[\s",;]')
 # Numbers with points or commas, and of these such whose marks may be between thousands.
 _MARKED = re.compile(r"[-+]?\d*[.,][\d.,]*(?:[eE][-+]?\d+)?")
 _IN_THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2}([.,])\d{3}(?:\1\d{3})*")
-# Thousands with blanks or apostrophes between them.
-_GAPPED = re.compile(r"(?<![\d.,])[1-9]\d{0,2}(?:['\u2019 \u00a0\u2009\u202f]\d{3})+(?!\d)")
-_DATE = r"(?:(\d{4})-(\d\d)-(\d\d)[T ]|(\d\d)\.(\d\d)\.(\d{4})[T ])?"
-_ZONE = r"(?:Z|([-+])(\d\d):?(\d\d))?"
-_CLOCK = re.compile(_DATE + r"(\d{1,6}):([0-5]\d):([0-5]\d(?:[.,]\d+)?)" + _ZONE)
+_CLOCK = re.compile(r"(\d{1,6}):([0-5]\d):([0-5]\d(?:[.,]\d+)?)")
+_DATE = re.compile(r"(\d\d)\.(\d\d)\.(\d{4})")
 DAY_S = 86_400
 """Seconds of a day."""
 _GAPS = ("", "-", "na", "n/a", "#n/a", "#nv")
@@ -134,19 +130,14 @@ def read_sheet(path: Path, columns: MeasurementBlock) -> Sheet:
     quote has no end, or that file or line is too large.
     """
     encoding, lines = _read_lines(path)
-    without_end = len(lines) if lines[-1].strip() else 0
-    numbered = _with_names(lines, {*map(plain_name, columns.named.values())})
+    separator, numbered = _with_names(lines, {*map(plain_name, columns.named.values())})
     if not numbered:
         raise BiogripError(f"{place(path)}: found no header, allowed is a line with column names.")
-    lines, kept = [line for line, _ in numbered], np.array([number for _, number in numbered])
-    headers = [i for i, it in enumerate(lines) if i == 0 or kept[i] == 0 or not _ROW.match(it)]
-    named = separator = _separator(lines, [lines[i] for i in headers], columns)
-    if separator == BLANKS:
-        named, width = "\t", len(_CELL.findall(lines[-1]))
-        parted = [(_WIDE_GAP.split(line.strip()), _CELL.findall(line)) for line in lines]
-        lines = ["\t".join(wide if len(wide) == width else cells) for wide, cells in parted]
-    cells, widths = _cells(path, lines, kept, named)
-    return Sheet(encoding, separator, cells, widths, kept, headers, without_end)
+    kept, numbers = [line for line, _ in numbered], np.array([number for _, number in numbered])
+    headers = [i for i, it in enumerate(kept) if i == 0 or numbers[i] == 0 or not _ROW.match(it)]
+    cells, widths = _cells(path, kept, numbers, "\t" if separator == BLANKS else separator)
+    without_end = len(lines) if lines[-1].strip() else 0
+    return Sheet(encoding, separator, cells, widths, numbers, headers, without_end)
 
 
 def overview(path: Path) -> tuple[Sheet, list[Table]]:
@@ -160,7 +151,7 @@ def overview(path: Path) -> tuple[Sheet, list[Table]]:
         tables = _tables(sheet, columns) or [_likely_table(sheet)]
         longest = max(tables, key=lambda table: table.end - table.first)
         # With two of its columns, every table that has them is found; without names, by numbers.
-        words = [name for name in dict.fromkeys(longest.names) if name and not _is_number(name)]
+        words = [name for name in dict.fromkeys(longest.names) if name and not is_number(name)]
         first, second, *_ = [*words, "1", "2"]
         columns = replace(columns, time=first, strain=second)
     return sheet, tables
@@ -175,8 +166,7 @@ def numbers_in(sheet: Sheet, table: Table) -> dict[str, Array]:
 def numbers_of(sheet: Sheet, table: Table, index: int) -> Array:
     """Return the numbers of a column, (n_rows,), times of day in s; NaN or inf for others."""
     cells = [*map(str, sheet.cells[table.first : table.end, index])]
-    number = seconds_or_inf if is_clock(cells) else find_marks(cells, sheet.separator).number
-    return np.array([*map(number, cells)], dtype=float)
+    return np.array([*map(number_reader(cells, decimal_mark(cells, sheet.separator)[0]), cells)])
 
 
 def _cells(
@@ -247,77 +237,70 @@ def _read_text(path: Path) -> tuple[str, str]:
     )
 
 
-def _with_names(lines: Sequence[str], wanted: set[str]) -> list[tuple[str, int]]:
-    """Return lines with numbers from 1, without comments and empty ones, but with those of names.
+def _with_names(lines: Sequence[str], wanted: set[str]) -> tuple[str, list[tuple[str, int]]]:
+    """Return the separator, and lines with numbers from 1, without comments and empty ones.
 
-    Numbers of columns are names above the first row. Where no other line has the wanted names,
-    comments may have them.
+    Where no other line has the wanted names, comments may have them, or they are numbers of
+    columns, which then stand above the first row. Blanks between cells become tabs.
     """
     every = [(line, number) for number, line in enumerate(lines, 1)]
     kept = [own for own in every if not _LEFT_OUT.match(own[0])]
-    plain = [own for own in kept if not _COMMENT.match(own[0])]
-    first = next((own for own in plain if _ROW.match(own[0] + " ")), None)
-    if any(_has(line, wanted) for line, _ in plain if not _ROW.match(line)) or first is None:
-        return kept
-    if all(map(str.isdecimal, wanted)):
-        separator = max((*SEPARATORS[::-1], BLANKS), key=lambda it: len(_split(first[0], it)))
-        widest = range(1, len(_split(first[0], separator)) + 1)
-        names = (separator.join(map(str, widest)), 0)
-        return [*(own for own in plain if own[1] < first[1]), names, *plain[plain.index(first) :]]
-    said = {
-        number: _COMMENT.sub("", line, count=1) for line, number in every if _COMMENT.match(line)
-    }
-    headers = _headers_in(said, plain, first, wanted)
-    return _with_headers(every, said, headers) if headers else kept
+    words = [line for line, _ in kept if not _ROW.match(line)]
+    separator, common = _separator(kept, words, wanted)
+    first = next((own for own in kept if _ROW.match(own[0] + " ")), None)
+    if first and common < len(wanted):
+        kept = [own for own in kept if not _COMMENT.match(own[0])]
+        if all(map(str.isdecimal, wanted)):
+            names = range(1, len(_split(first[0], separator)) + 1)
+            kept.insert(kept.index(first), (separator.join(map(str, names)), 0))
+        else:
+            comments = [_said(line, bare=True) for line in lines if _COMMENT.match(line)]
+            separator, _ = _separator(kept, [*words, *comments], wanted)
+            kept = _with_comments(every, first[1], separator, wanted)
+    if separator == BLANKS:
+        width = _width(kept, separator)
+        kept = [("\t".join(_cells_of(line, separator, width)), number) for line, number in kept]
+    return separator, kept
 
 
-def _headers_in(
-    said: Mapping[int, str], plain: list[tuple[str, int]], first: tuple[str, int], wanted: set[str]
-) -> list[int]:
-    """Return which comments are names: those wanted, or the last before the first row, as wide."""
-    names = {number: _BEFORE_NAMES.sub("", text) for number, text in said.items()}
-    if found := [number for number, text in names.items() if _has(text, wanted)]:
-        return found
-    widths = [len(it) if len(it) > 1 else 0 for it in _splits(first[0])]
-    before = [*names.items(), *((number, line) for line, number in plain)]
-    likely = [
-        number
-        for number, text in before
-        if number < first[1] and any(map(eq, map(len, _splits(text)), widths))
-    ]
-    return [number for number in likely[-1:] if number in said]
-
-
-def _with_headers(
-    every: list[tuple[str, int]], said: Mapping[int, str], headers: list[int]
+def _with_comments(
+    every: Sequence[tuple[str, int]], first: int, separator: str, wanted: set[str]
 ) -> list[tuple[str, int]]:
-    """Return rows, and comments that are names, or above or below them of their header.
+    """Return lines that are no comments, and comments of a header, which may follow ``key: value``.
 
-    These are ``key: value`` above the names, ``units:`` below them, and words as many as the names.
+    These have the wanted names, or stand beside such or above the first row, with as many words.
     """
-    kept = list[tuple[str, int]]()
-    for in_comments, group in groupby(every, lambda line: not line[0].strip() or line[1] in said):
-        block = [*group]
-        at = next((i for i, (_, number) in enumerate(block) if number in headers), None)
+    kept, width = list[tuple[str, int]](), _width(every, separator)
+    for in_comments, group in groupby(
+        every, lambda own: not own[0].strip() or _COMMENT.match(own[0]) is not None
+    ):
+        block, header = [*group], list[tuple[str, int]]()
         if not in_comments:
             kept += block
-        elif at is not None:
-            texts = [(said.get(number, "").strip(), number) for _, number in block]
-            names = _BEFORE_NAMES.sub("", said[block[at][1]])
-            kept += (line for line in texts[:at] if ":" in line[0] or _as_wide(line[0], names))
-            kept.append((names, block[at][1]))
-            bare = ((_BEFORE_UNITS.sub("", text), text, number) for text, number in texts[at + 1 :])
-            kept += ((b, n) for b, text, n in bare if b != text or _as_wide(text, names))
+            continue
+        is_named = block[0][1] < first
+        for line, number in block:
+            cells = _cells_of(text := _said(line, bare=True), separator, width)
+            has_names = wanted <= _names(cells)
+            is_named |= has_names
+            if has_names or (len(cells) == width > 1 and not any(map(_NUMERIC.fullmatch, cells))):
+                header.append((text, number))
+        if header and is_named:
+            said = [(_said(line), number) for line, number in block if number < header[0][1]]
+            kept += [*(own for own in said if ":" in own[0]), *header]
     return kept
 
 
-def _as_wide(text: str, names: str) -> bool:
-    """Return True if a line has as many words as there are names, and no number among them."""
-    pairs = zip(_splits(text), _splits(names), strict=True)
-    return any(
-        len(words) == len(others) > 1 and not any(map(_NUMERIC.fullmatch, words))
-        for words, others in pairs
-    )
+def _said(line: str, *, bare: bool = False) -> str:
+    """Return what a comment says, if asked without a word before it, as ``columns:``."""
+    text = _COMMENT.sub("", line, count=1).strip()
+    return _PREFIX.sub("", text) if bare else text
+
+
+def _width(lines: Sequence[tuple[str, int]], separator: str) -> int:
+    """Return the number of cells in the last row of numbers."""
+    rows = (line for line, _ in reversed(lines) if _ROW.match(line + " "))
+    return len(_split(next(rows, ""), separator))
 
 
 def _split(line: str, separator: str) -> list[str]:
@@ -326,22 +309,22 @@ def _split(line: str, separator: str) -> list[str]:
     return [line] if _OTHERWISE.search(line) else _CELL.findall(line)
 
 
-def _splits(line: str) -> list[list[str]]:
-    """Return the cells of a line by every separator, and by gaps of at least two blanks."""
-    return [*(_split(line, it) for it in (*SEPARATORS, BLANKS)), _WIDE_GAP.split(line.strip())]
-
-
-def _has(line: str, wanted: set[str]) -> bool:
-    return any(wanted <= _names(cells) for cells in _splits(line))
+def _cells_of(line: str, separator: str, width: int) -> list[str]:
+    """Return the cells of a line; words with single blanks are one if there are then as many."""
+    if separator != BLANKS:
+        return line.split(separator)
+    wide = _WIDE_GAP.split(line.strip())
+    return wide if len(wide) == width else _CELL.findall(line)
 
 
 def _names(cells: Sequence[str]) -> set[str]:
     return {plain_name(_QUOTED.sub(r"\1", cell)) for cell in cells}
 
 
-def _separator(lines: Sequence[str], headers: Sequence[str], columns: MeasurementBlock) -> str:
-    """Return the separator by which a line has most columns to read, or which most lines have."""
-    wanted = {*map(plain_name, columns.named.values())}
+def _separator(
+    lines: Sequence[tuple[str, int]], headers: Sequence[str], wanted: set[str]
+) -> tuple[str, int]:
+    """Return what parts most wanted names in a header, or the cells of most lines; and how many."""
 
     def merit(separator: str) -> tuple[int, int]:
         common = 0
@@ -349,10 +332,13 @@ def _separator(lines: Sequence[str], headers: Sequence[str], columns: Measuremen
             wide = _WIDE_GAP.split(row.strip()) if separator == BLANKS else []
             of = (len(wanted & _names(cells)) for cells in (_split(row, separator), wide))
             common = max(common, *of)
-        return common, sum(len(_split(it, separator)) > 1 for it in lines[:_LINES_SEARCHED])
+        parted = (len(_split(line, separator)) > 1 for line, _ in lines[:_LINES_SEARCHED])
+        return common, sum(parted)
 
     # Where as many lines have commas as tabs or semicolons, these are decimal commas.
-    return max((*SEPARATORS[::-1], BLANKS), key=merit)
+    merits = {separator: merit(separator) for separator in (*SEPARATORS[::-1], BLANKS)}
+    separator = max(merits, key=lambda it: merits[it])
+    return separator, merits[separator][0]
 
 
 def find_tables(
@@ -373,10 +359,9 @@ def find_tables(
         return tables, [block - 1 for block in columns.blocks]
     said, allowed = f"no block {missing[0] if missing else 0}", f"are 1 to {len(tables)}:"
     if not columns.blocks:
-        names, option = ", ".join(f"'{name}'" for name in columns.named.values()), "block: 1"
-        option, joined = ("--block 1", "--block 1,2") if columns.by_options else (option, "[1, 2]")
+        names = ", ".join(f"'{name}'" for name in columns.named.values())
         said = f"{counted(count, 'block')} with the columns {names}"
-        allowed = f"is one, as by {option}, or several that are one test, as by {joined}."
+        allowed = "is one, as by --block 1, or several that are one test, as by --block 1,2."
     shown = [
         f"\n  {number}: {_in_words(sheet, table, columns)}"
         for number, table in enumerate(tables[:_TABLES_SHOWN], 1)
@@ -529,7 +514,7 @@ def _in_preamble(cells: Sequence[str], width: int) -> bool:
     """Return True if cells are no row, even a damaged one: few, or beginning like ``Test:``."""
     filled = [i for i, cell in enumerate(cells) if cell]
     first = cells[filled[0]] if filled else ":"
-    return first.endswith(":") or (not _is_number(first) and filled[-1] + 1 < width)
+    return first.endswith(":") or (not is_number(first) and filled[-1] + 1 < width)
 
 
 def _title(sheet: Sheet, start: int, table: Table) -> str:
@@ -539,84 +524,52 @@ def _title(sheet: Sheet, start: int, table: Table) -> str:
 
 
 def _count_numbers(cells: Sequence[str]) -> int:
-    return sum(map(_is_number, cells))
+    return sum(map(is_number, cells))
 
 
-def _is_number(cell: str) -> bool:
+def is_number(cell: str) -> bool:
     """Return True if a cell is a finite number, with a decimal point or comma."""
     return isfinite(number_or_inf(cell.replace(",", ".")))
 
 
-@dataclass(frozen=True)
-class Marks:
-    """Marks in the numbers of a table."""
-
-    decimal: str = "."
-    """The decimal mark; empty if it cannot be told."""
-    thousands: str = ""
-    """What is between thousands, blank for blanks and apostrophes."""
-    cells: tuple[str, ...] = ()
-    """Cells that leave it open: one whose mark may as well be between thousands, or two that speak
-    against each other."""
-
-    def number(self, cell: str) -> float:
-        """Return a cell's number: see `number_or_inf`."""
-        if self.thousands == " ":
-            cell = _without_gaps(cell)
-        elif self.thousands:
-            cell = re.sub(rf"(?<=\d)[{self.thousands}](?=\d{{3}}(?!\d))", "", cell)
-        return number_or_inf(cell.replace(self.decimal, "."))
-
-
-def _without_gaps(text: str) -> str:
-    return _GAPPED.sub(lambda found: re.sub(r"\D", "", found[0]), text)
-
-
-def find_marks(cells: Sequence[str], separator: str) -> Marks:
+def decimal_mark(cells: Sequence[str], separator: str) -> tuple[str, str]:
     """Tell the decimal mark of a table's numbers, which is one for all columns.
 
-    A mark is decimal if it is nowhere, or in one cell not, where one between thousands would be.
-    Between commas that part cells no comma is.
+    Where it may everywhere as well be between thousands, such a cell is returned, too. Between
+    commas that part cells no comma is decimal.
     """
-    written = "\n".join(cells)
-    text = _without_gaps(written)
-    plain, blank = text.split("\n"), " " * (text != written)
-    present = [mark for mark in ".," if mark in text]
-    sure: dict[str, str] = {}
-    for cell, number in zip(cells, plain, strict=False):
-        if len(sure) == len(present):
-            break
-        if _MARKED.fullmatch(number) and not _IN_THOUSANDS.fullmatch(number):
-            sure.setdefault(max(present, key=number.rfind), cell)
-    if separator == "," and present:
-        sure = {".": ""}
-    if len(sure) == 1:
-        (decimal,) = sure
-        others = "".join(mark for mark in present if mark != decimal)
-        return Marks(decimal, others or blank)
-    if not present:
-        return Marks(thousands=blank)
-    either = tuple(sure.values()) or tuple(next(c for c in cells if m in c) for m in present)
-    if len(present) > 1:
-        return Marks("", blank, either)
-    if any(it.count(present[0]) > 1 for it in plain if _IN_THOUSANDS.fullmatch(it)):
-        return Marks(".,".replace(present[0], ""), present[0])
-    return Marks(present[0], blank, either)
+    unclear: tuple[str, str] | None = None
+    for cell in cells if separator != "," else ():
+        if ("." in cell or "," in cell) and _MARKED.fullmatch(cell):
+            mark = max(".,", key=cell.rfind)
+            if not _IN_THOUSANDS.fullmatch(cell):
+                return mark, ""
+            unclear = unclear or (mark, cell)
+    return unclear or (".", "")
+
+
+def number_reader(cells: Sequence[str], decimal: str) -> Callable[[str], float]:
+    """Return what reads cells of a column, as seconds or as numbers with such a decimal mark.
+
+    It gives NaN for a gap, and inf for what it cannot read.
+    """
+    other = ".,".replace(decimal, "")
+    if is_clock(cells):
+        return seconds_or_inf
+    return lambda cell: inf if other in cell else number_or_inf(cell.replace(decimal, "."))
 
 
 def seconds_or_inf(cell: str) -> float:
     """Return seconds of hours, minutes, seconds, and perhaps a date, else as `number_or_inf`."""
-    if not (found := _CLOCK.fullmatch(cell)):
-        return nan if cell.lower() in _GAPS else inf
-    *days, hours, minutes, seconds, sign, zone_h, zone_min = found.groups()
-    year, month, day = days[:3] if days[0] else days[:2:-1]
-    try:
-        count = date(int(year), int(month), int(day)).toordinal() if year else 0
-    except ValueError:
-        return inf
-    zone_s = 3600 * int(zone_h or 0) + 60 * int(zone_min or 0)
-    passed_s = DAY_S * count + 3600 * int(hours) + 60 * int(minutes)
-    return passed_s + (zone_s if sign == "-" else -zone_s) + float(seconds.replace(",", "."))
+    if found := _CLOCK.fullmatch(cell):
+        hours, minutes, seconds = found.groups()
+        return 3600 * int(hours) + 60 * int(minutes) + float(seconds.replace(",", "."))
+    if cell.count(":") > 1:
+        with suppress(ValueError):
+            moment = datetime.fromisoformat(_DATE.sub(r"\3-\2-\1", cell))
+            passed = moment.replace(tzinfo=None) - datetime.min
+            return (passed - (moment.utcoffset() or timedelta())).total_seconds()
+    return nan if cell.lower() in _GAPS else inf
 
 
 def is_clock(cells: Sequence[str]) -> bool:

@@ -113,13 +113,9 @@ class Shared(_MethodBlocks, ExperimentBlocks):
     """Blocks that a study sets for all cases, and that a case may change for itself."""
 
     models: Equations
-    calibration: Annotated[
-        CalibrationTest,
-        Field(
-            description="The no-load test of each arm (end of section 2), for cases whose "
-            "assumed_gripper is `calibrated`."
-        ),
-    ]
+    calibration: CalibrationTest
+    """The no-load test of each arm (end of section 2), for cases whose assumed_gripper is
+    `calibrated`."""
     identifiability: Identifiability
 
     def method(self, name: str) -> Any:

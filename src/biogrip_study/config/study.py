@@ -13,7 +13,7 @@ from typing import Any
 from biogrip.config.case import SampleCase
 from biogrip.config.loading import load, read_configs, refuse, trace_defaults
 from biogrip.config.messages import checked
-from biogrip.config.source import Source, overlaid, read_source, values_in
+from biogrip.config.source import Source, keys_in, overlaid, read_source, values_in
 from biogrip.errors import BiogripError
 from biogrip.fit.experiment import Experiment
 from biogrip.keys import Complaint, below, built, plain
@@ -207,7 +207,13 @@ def load_study(
         study = replace(
             study, cases={name: study.cases[name] for name in study.only or study.cases}
         )
-        refuse([*_point_complaints(study), *_reading_complaints(study)], sources, OVERRIDABLE)
+        complaints = [*_point_complaints(study), *_reading_complaints(study)]
+        known = {*keys_in(config)}
+        for index, key in enumerate(study.reconstructed):
+            if tuple(key.split(".")) not in known:
+                text = f"found '{key}', allowed is a key of this study."
+                complaints.append((("reconstructed", index), text))
+        refuse(complaints, sources, OVERRIDABLE)
     except BiogripError as error:
         text = f"The study's configuration cannot be used.\n{error}"
         raise BiogripError(text) from error

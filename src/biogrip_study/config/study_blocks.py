@@ -13,9 +13,9 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, Field, Tag
 
-from biogrip.config.design_blocks import DesignBlock
+from biogrip.config.design_blocks import MOST_CASES, CasesBlocks
 from biogrip.config.source import overlaid
-from biogrip.config.trace_blocks import CandidateName, CaseName, CommonBlocks
+from biogrip.config.trace_blocks import CandidateName, CaseName
 from biogrip.errors import nearest
 from biogrip.keys import (
     BY_KIND,
@@ -25,8 +25,6 @@ from biogrip.keys import (
     Distinct,
     OneOf,
     Printed,
-    adapter,
-    below,
     plain,
     unknown_names,
 )
@@ -47,7 +45,8 @@ class ValueBlock(BaseModel):
     model_config = OPEN
     __pydantic_extra__: dict[str, Annotated[_Number | _Text, BY_KIND]] = Field(init=False)
 
-    label: Annotated[Printed, Field(description="Name of the value in print.")]
+    label: Printed
+    """Name of the value in print."""
 
 
 _Keys = Distinct[Annotated[tuple[str, ...], Field(min_length=1, max_length=100)]]
@@ -198,7 +197,6 @@ def _word(value: float | str) -> str:
     return re.sub(r"[^A-Za-z0-9-]+", "_", text)
 
 
-_MOST_CASES = 2000
 _SweepName = Annotated[
     str,
     Field(
@@ -251,7 +249,7 @@ class TracesBlock(Block):
 
 
 @dataclass(frozen=True, kw_only=True)
-class StudyConfig(CommonBlocks, Shared):
+class StudyConfig(CasesBlocks, Shared):
     """All keys of a study's config."""
 
     seeds: Annotated[int, Field(ge=1, le=1_000_000)]
@@ -270,29 +268,16 @@ class StudyConfig(CommonBlocks, Shared):
     evaluation: Evaluation
     reconstructed: Annotated[tuple[str, ...], Field(max_length=1000)]
     """Keys, or whole blocks, whose values the paper does not give. Tables mark them."""
-    cases: Annotated[
-        Mapping[CaseName, CaseBlock],
-        Field(
-            max_length=_MOST_CASES,
-            description=f"The samples of the study, by name, at most {_MOST_CASES}. Any of the "
-            f"blocks {', '.join(OVERRIDABLE)} may be given in a case, too; its keys then hold for "
-            "this case alone.",
-        ),
-    ]
+    cases: Annotated[Mapping[CaseName, CaseBlock], Field(min_length=1, max_length=MOST_CASES)]
+    """The samples of the study, by name, at most 2000. Any block that a study sets for all cases,
+    as gripper, protocol or measurement, may be given in a case, too; its keys then hold for this
+    case alone."""
     traces: TracesBlock | None = None
     """A table of recorded traces, which are identified in batches beside the cases, as `biogrip
     identify` does."""
-    only: Distinct[Annotated[tuple[str, ...], Field(min_length=1, max_length=_MOST_CASES)]] = ()
-    """Names of the cases to run; the others are left out. By default all under `cases`."""
-    design: DesignBlock = field(default_factory=DesignBlock)
-    sweeps: Annotated[
-        Mapping[_SweepName, SweepBlock],
-        Field(
-            description=f"Grids of cases, by name, of at most {MOST_POINTS} points together. Every "
-            "point is a case that differs in two values; it is identified like others, and shown "
-            "in the sweep's table only."
-        ),
-    ] = field(default_factory=dict)
+    sweeps: Mapping[_SweepName, SweepBlock] = field(default_factory=dict)
+    """Grids of cases, by name, of at most 2000 points together. Every point is a case that differs
+    in two values; it is identified like others, and shown in the sweep's table only."""
     readings: Annotated[Mapping[_SweepName, ReadingBlock], Field(max_length=100)] = field(
         default_factory=dict
     )
@@ -301,18 +286,10 @@ class StudyConfig(CommonBlocks, Shared):
 
     def complaints(self) -> Iterator[Complaint]:
         """Find too many jobs, samples that do not fit, and names of nothing that there is."""
-        if not self.cases:
-            yield ("cases",), "found none, allowed is one or more."
+        yield from super().complaints()
         yield from self._model_complaints()
-        for name, case in self.cases.items():
-            yield from below(("cases", name), case.comb_complaints(self.actuator))
-        yield from self._reconstructed_complaints()
         chosen = [name for name in self.cases if name in (self.only or self.cases)]
         yield from self._point_complaints(chosen)
-        searched = [p.name for case in self.cases.values() for p in case.searched]
-        asked = self.design.parameters
-        yield from unknown_names(("design", "parameters"), asked, dict.fromkeys(searched))
-        yield from unknown_names(("only",), self.only, self.cases)
         for title, sweep in self.sweeps.items():
             yield from unknown_names(("sweeps", title, "cases"), sweep.cases, chosen)
 
@@ -324,16 +301,6 @@ class StudyConfig(CommonBlocks, Shared):
             if CANDIDATES[name].model.power_law and longest > LONGEST_S:
                 text = f"found {name} and a protocol of {longest:g} s, allowed are at most"
                 yield ("model_selection", "models", index), f"{text} {LONGEST_S:g} s with it."
-
-    def _reconstructed_complaints(self) -> Iterator[Complaint]:
-        """Find names of no key."""
-        known = adapter(StudyConfig).dump_python([self])[0] if self.reconstructed else {}
-        for index, key in enumerate(self.reconstructed):
-            block: Any = known
-            for part in key.split("."):
-                block = block.get(part) if isinstance(block, Mapping) else None
-            if block is None:
-                yield ("reconstructed", index), f"found '{key}', allowed is a key of this study."
 
     def _point_complaints(self, cases: Iterable[str]) -> Iterator[Complaint]:
         """Find too many points of sweeps, and such as have the name of another or of a case."""

@@ -12,8 +12,8 @@ import biogrip_study.records.identifications as records
 from biogrip.arrays import Array
 from biogrip.figures import style
 from biogrip.figures.fit import draw_traces
-from biogrip.judging.quantities import parameters_and_sum, quantity_value
-from biogrip.judging.verdicts import BOUNDED_ABOVE
+from biogrip.judging.likelihood import parameters_and_sum, quantity_value
+from biogrip.judging.profiles import BOUNDED_ABOVE
 from biogrip_study.config.study import Case, Study
 from biogrip_study.figures import case_fit
 

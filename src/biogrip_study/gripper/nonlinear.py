@@ -32,13 +32,14 @@ from biogrip.physics.gripper import Arm, Gripper, rotation_of_tip
 from biogrip.physics.protocol import Course, evaluate
 from biogrip.physics.response import (
     LEFT,
+    Arms,
+    Grip,
+    extreme_forces,
     linear_jaw_force,
     step_response,
     superpose,
-    weights_of_loads,
 )
 from biogrip.physics.sample_model import Network
-from biogrip.physics.simulation import Grip, extreme_forces
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
@@ -174,7 +175,7 @@ def correction(
     arms = [gripper.left] if gripper.left == gripper.right else [gripper.left, gripper.right]
     response = step_response(gripper, network, inertia=False)
     edges = _mesh(torque)
-    modes = _MeshModes(response.rates, weights_of_loads(gripper, network), np.diff(edges))
+    modes = _MeshModes(response.rates, _weights_of_loads(gripper, network), np.diff(edges))
     # Collocation nodes, (n_elements, _STAGES).
     nodes = edges[:-1, None] + np.diff(edges)[:, None] * _radau()[0]
     nodes[:, -1] = edges[1:]
@@ -219,6 +220,26 @@ def correction(
     return Correction(
         _on_mesh(np.append(0.0, c), values, edges), _on_mesh(c, force, edges), converged
     )
+
+
+def _weights_of_loads(gripper: Gripper, network: Network) -> Array:
+    """Compute weights of the modes without inertia under steps of either arm's load.
+
+    In rad per N m, (n, n_arms, n_loads, n_modes); loads are that of both arms and, where these
+    differ, what that of the left arm exceeds that of the right one by: phi_2 = [Z_4/(Z_2 + Z_4)
+    tau_2 + b^2 G/(Z_2 + Z_4) (tau_2 - tau_4)] / H. Of equal arms, only that of both, and one stands
+    for both.
+    """
+    arms = Arms(gripper)
+    impedance = arms.with_sample(network)
+    zeros = impedance.zeros()
+    of_right, of_left = arms.rotations(zeros)
+    numerators = [[of_right]]
+    if not arms.alike:
+        through = -of_left * of_right
+        numerators = [[of_right, through], [of_left, -of_left - through]]
+    weights = -np.array(numerators) / impedance.steepness(zeros)
+    return np.ascontiguousarray(np.moveaxis(weights, -1, 0))
 
 
 def _on_mesh(points: Array, values: Array, edges_s: Array) -> "PPoly":

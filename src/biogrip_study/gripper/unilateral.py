@@ -19,8 +19,8 @@ import numpy as np
 
 from biogrip.arrays import Array, BoolArray
 from biogrip.physics.gripper import Gripper
+from biogrip.physics.modes import phi_functions
 from biogrip.physics.protocol import Course
-from biogrip.physics.response import phi_functions
 from biogrip.physics.sample_model import Network
 
 # Share of the largest force and closing below which a change of contact is rounding.

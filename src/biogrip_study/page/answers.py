@@ -4,7 +4,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 
 from biogrip.digits import legible, plain, with_unit
-from biogrip.judging.verdicts import DETERMINED
+from biogrip.judging.profiles import DETERMINED
 
 TableRow = Mapping[str, str]
 

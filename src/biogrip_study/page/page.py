@@ -16,12 +16,11 @@ from biogrip import __version__
 from biogrip.digits import legible, significant, with_unit
 from biogrip.errors import BiogripError
 from biogrip.figures.fit import scale_of
-from biogrip.files import write_text
-from biogrip.judging.quantities import PROVIDED, quantity_value
+from biogrip.files import read_table, whole, write_text
+from biogrip.judging.likelihood import PROVIDED, quantity_value
 from biogrip.judging.what_moves import error_in_words
 from biogrip.page.templates import data_url, environment
 from biogrip.physics.noise import rms
-from biogrip.records import read_table, whole
 from biogrip_study.config.study import Case, Study
 from biogrip_study.page import answers
 from biogrip_study.records.identifications import read_verdicts, share_with_limits

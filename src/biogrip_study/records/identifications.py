@@ -15,10 +15,10 @@ import numpy as np
 
 from biogrip.arrays import Array, BoolArray
 from biogrip.digits import significant
+from biogrip.files import read_object
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.problem import Fit
 from biogrip.physics.sample_model import SINGLE_BRANCH, Parameter, SampleModel
-from biogrip.records import read_object
 from biogrip_study.config.study import Case, Study
 from biogrip_study.records.rows import RowFile, read_arrays, seeds_of
 

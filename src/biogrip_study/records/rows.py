@@ -1,6 +1,6 @@
 """How files between rules are written and read: CSV with a header, and arrays of NumPy.
 
-The rows of a file are all that whoever reads it knows of, see `biogrip.records`.
+The rows of a file are all that whoever reads it knows of, see `biogrip.files`.
 """
 
 import zlib
@@ -16,8 +16,7 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.files import atomic_write
-from biogrip.records import AGAIN, as_it_was, whole, write_rows
+from biogrip.files import AGAIN, as_it_was, atomic_write, whole, write_rows
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -10,8 +10,8 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
+from biogrip.files import AGAIN, whole, write_rows
 from biogrip.physics.instruments import Instrument
-from biogrip.records import AGAIN, whole, write_rows
 from biogrip.traces.reader import Recording
 from biogrip_study.records.rows import read_arrays, write_arrays
 

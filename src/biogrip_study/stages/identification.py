@@ -16,10 +16,10 @@ import numpy as np
 
 import biogrip_study.records.identifications as records
 from biogrip.arrays import parts
+from biogrip.files import read_table, write_rows
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.nested_fits import fit_models
 from biogrip.physics.noise import rms, stream
-from biogrip.records import read_table, write_rows
 from biogrip.terminal import Progress
 from biogrip_study.config.study import Case
 from biogrip_study.methods.genome import lowest_encodable

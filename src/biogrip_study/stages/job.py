@@ -19,7 +19,7 @@ from typing import Any, ClassVar, get_type_hints
 
 from biogrip.errors import BiogripError
 from biogrip.keys import built
-from biogrip.processes import collect_less
+from biogrip.terminal import collect_less
 from biogrip.traces.measurement_block import MeasurementBlock
 from biogrip_study.config.case_blocks import CaseBlock, Identifiability
 from biogrip_study.config.study import Case, Study

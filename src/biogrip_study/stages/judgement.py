@@ -20,16 +20,15 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.digits import rounded_numbers
+from biogrip.files import write_object
 from biogrip.fit.least_squares import identify_from
 from biogrip.fit.trace_fit import TraceFit, fit_least_squares
 from biogrip.identify.data import judged_data
 from biogrip.identify.identify import identify_alike
 from biogrip.judging.diagnosis import Diagnosis, diagnose, profiled, settled
-from biogrip.judging.likelihood import Likelihood
-from biogrip.judging.quantities import Quantity, parameters_and_sum
-from biogrip.judging.verdicts import DETERMINED, Finding, compute_findings
+from biogrip.judging.likelihood import Likelihood, Quantity, parameters_and_sum
+from biogrip.judging.profiles import DETERMINED, Finding, compute_findings
 from biogrip.physics.noise import add_noise, rms, standard_deviation
-from biogrip.records import write_object
 from biogrip.terminal import Progress
 from biogrip_study.config.study import Case
 from biogrip_study.records.identifications import INTERVALS, read_verdicts
@@ -170,7 +169,7 @@ def judge_quantities(
     """
 
     def profile(likelihoods: Sequence[Likelihood]) -> list[Diagnosis]:
-        every = compute_findings(likelihoods, quantities, smooth=False)
+        every = compute_findings(likelihoods, quantities)
         return [profiled(*pair, []) for pair in zip(likelihoods, every, strict=True)]
 
     problems, best_fits = [fit.problem for fit in fits], [fit.found for fit in fits]
@@ -180,7 +179,7 @@ def judge_quantities(
 
 def _estimates(quantity: Quantity, best: Array, finding: Finding) -> Iterator[str]:
     """Yield the estimate of a quantity at the best log-parameters, and its limits, as text."""
-    low, high = finding.profile.low, finding.profile.high
+    low, high = finding.log_low, finding.log_high
     narrow = low is not None and high is not None and high - low < _NARROW
     digits = _MORE_DIGITS if narrow else _ESTIMATE_DIGITS
     for log in (quantity.log(best), low, high):

@@ -16,7 +16,7 @@ from biogrip.errors import BiogripError
 from biogrip.files import write_text
 from biogrip.physics.noise import Noise, add_noise, standard_deviation, stream
 from biogrip.physics.protocol import evaluate, sample_times
-from biogrip.physics.simulation import simulated_response
+from biogrip.physics.response import simulated_response
 from biogrip.terminal import warn
 from biogrip.traces.columns import place
 from biogrip_study.config.study import Case

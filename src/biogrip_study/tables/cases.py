@@ -14,8 +14,8 @@ import numpy as np
 
 import biogrip_study.records.identifications as records
 from biogrip.digits import counted
-from biogrip.judging.quantities import parameters_and_sum, quantity_value
-from biogrip.judging.verdicts import DETERMINED
+from biogrip.judging.likelihood import parameters_and_sum, quantity_value
+from biogrip.judging.profiles import DETERMINED
 from biogrip_study.config.study import Case, Study
 from biogrip_study.tables.layout import Column, Row, ShownTable, titled
 

@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from biogrip.files import write_text
-from biogrip.records import write_rows
+from biogrip.files import write_rows, write_text
 
 Row = dict[str, Any]
 """Text or numbers by the name of their column; None, NaN or no cell is an empty one."""

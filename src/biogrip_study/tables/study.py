@@ -9,9 +9,8 @@ from scipy.special import betaincinv
 
 import biogrip_study.records.identifications as records
 from biogrip.fit.nested_fits import aic_and_bic
-from biogrip.judging.likelihood import bounds_percent
-from biogrip.judging.quantities import Quantity, parameters_and_sum, quantity_value
-from biogrip.judging.verdicts import DETERMINED, NOT_DETERMINED
+from biogrip.judging.likelihood import Quantity, bounds_percent, parameters_and_sum, quantity_value
+from biogrip.judging.profiles import DETERMINED, NOT_DETERMINED
 from biogrip.levels import WIDE
 from biogrip_study.config.study import Case, Study
 from biogrip_study.methods.registry import METHODS

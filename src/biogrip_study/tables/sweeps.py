@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+import biogrip.levels as levels
 import biogrip_study.records.identifications as records
 from biogrip.arrays import BoolArray
-from biogrip.judging.likelihood import headlines
-from biogrip.judging.quantities import quantity_value
+from biogrip.judging.likelihood import quantity_value
 from biogrip.physics.noise import rms
-from biogrip.physics.simulation import simulated_response
+from biogrip.physics.response import simulated_response
 from biogrip_study.config.study import Case, Study
 from biogrip_study.config.study_blocks import AxisBlock
 from biogrip_study.methods.genome import nearest_encodable
@@ -25,6 +25,19 @@ from biogrip_study.tables.study import bounds_at_truth
 
 # Log factor, and multiple of the bound, within which a value is in the basin of the truth.
 _FACTOR, _BOUNDS_OF_BASIN = math.log(2), 4.0
+
+
+def headlines(bounds: Sequence[tuple[str, float]]) -> list[str]:
+    """Return the best and the worst determined quantity of several points, by label.
+
+    Quantities count if their bound in percent, not NaN, is below `DETERMINED_PERCENT` at half of
+    the points or more. Parts of a sum, which may trade against each other, do not count beside it.
+    """
+    percents = pd.DataFrame(bounds, columns=["label", "percent"]).dropna()
+    medians = percents.groupby("label")["percent"].median().sort_values(kind="stable")
+    parts = {part for label in medians.index if " + " in label for part in label.split(" + ")}
+    determined = medians.index[medians < levels.DETERMINED_PERCENT].difference(parts, sort=False)
+    return [*determined[:1], *determined[1:][-1:]]
 
 
 def judge_point(

@@ -8,8 +8,10 @@ import pytest
 from scipy.stats import spearmanr
 
 from biogrip.arrays import Array
-from biogrip.fit.any_sample import fit_any_sample, proportional_deviations
-from biogrip.fit.noise_model_fit import (
+from biogrip.fit.any_sample import fit_any_sample
+from biogrip.fit.share_noise import proportional_deviations
+from biogrip.fit.trace_noise import (
+    NoiseModel,
     NoiseModelLikelihood,
     _logarithms,
     compute_growth,
@@ -19,7 +21,7 @@ from biogrip.fit.noise_model_fit import (
 from biogrip.library import set_up
 from biogrip.physics.instruments import INSTRUMENTS
 from biogrip.physics.models import Sample
-from biogrip.physics.noise import AR1, Noise, NoiseModel, add_noise
+from biogrip.physics.noise import AR1, Noise, add_noise
 from biogrip.physics.protocol import hold
 from tests.helpers.default import STUDY
 from tests.helpers.problems import clean
