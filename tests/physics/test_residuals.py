@@ -202,6 +202,17 @@ def test_nuisance_takes_out_offset_and_drift_and_nothing_else(offset: bool, drif
     np.testing.assert_allclose(within(basis, wave + added), added, atol=1e-12)
 
 
+def test_directions_with_corners_are_projected_out_of_all_readings(
+    gripper: Gripper, steps: Course
+) -> None:
+    """As those of a load that was smoothed: no polynomial of a piece carries a corner."""
+    times = np.linspace(0.0, 400.0, 5001)
+    corners = np.maximum(0.0, times[None] - np.array([[57.3], [260.0]]))
+    rows = Condensed(steps, times, np.linalg.qr(corners.T)[0].T)
+    residuals = posed(gripper, MODELS["maxwell"], rows, noise(5001))
+    assert_alike(residuals, np.log([2.0, 50.0]))
+
+
 READ_S = np.arange(401.0)
 AT = np.log([2.0, 50.0])
 

@@ -185,8 +185,12 @@ class Condensed:
     @cached_property
     def _dense(self) -> DenseSamples:
         """Nodes that replace the readings."""
-        # Whitened functions are not smooth: each reading is a node.
-        return DenseSamples(self.course, self.all_s, dense=self.whitening is None)
+        # Whitened functions are not smooth, nor are those of a load that was smoothed: each reading
+        # is a node then.
+        dense = DenseSamples(self.course, self.all_s, dense=self.whitening is None)
+        if all(dense.rows_of_samples(of)[1] < _ROUNDING_OF_NORM for of in self.functions):
+            return dense
+        return DenseSamples(self.course, self.all_s, dense=False)
 
     @cached_property
     def _modes(self) -> SpanningModes:
