@@ -432,7 +432,7 @@ def _table(rows: Iterable[dict[str, str]]) -> str:
     return str(pd.DataFrame(rows).to_markdown(index=False, disable_numparse=True))
 
 
-_COVERAGE = _path("coverage", "coverage")
+_COUNTS = _path("verdict_counts", "coverage")
 _SHORTER = "--no-compare", "--set", "gripper.arm_length_m=1.2e-3"
 PARTS: dict[str, dict[str, Callable[[], str]]] = {
     "docs/reference/config.md": {"keys": reference},
@@ -458,7 +458,7 @@ PARTS: dict[str, dict[str, Callable[[], str]]] = {
         "readings": readings_compared,
         "choices": choices,
         "joint": joint,
-        "told": lambda: _table(answers.rows_of_determined(read_table(_COVERAGE), _CASES)),
+        "told": lambda: _table(answers.rows_of_determined(read_table(_COUNTS), _CASES)),
         "protocols": protocols_compared,
         "together": protocols_together,
     },

@@ -127,16 +127,6 @@ def test_prefixes_dollars_and_methods() -> None:
     assert [it.dashes for it in METHODS.values()] == ["-", "--"]
 
 
-def test_points_beyond_an_axis_are_triangles_at_its_edge() -> None:
-    axes = figure(3, 3).subplots()
-    points = np.array([[1.0, 0.5], [2.0, 2.0], [3.0, -7.0], [4.0, 7.0], [99.0, 2.0]])
-    style.points_within(axes, points, (0, 0), (9, 5), {"marker": "o"}, edge_size=3)
-    drawn_at = {line.get_marker(): np.asarray(line.get_xydata()) for line in axes.lines}
-    np.testing.assert_array_equal(drawn_at["o"], points[:2])
-    edges = {"v": [[3, 0]], "^": [[4, 5]], ">": [[9, 2]]}
-    assert {marker: at.tolist() for marker, at in drawn_at.items() if marker != "o"} == edges
-
-
 @pytest.mark.parametrize(("certainty", "drawn"), [(10.8, True), (14.0, False)])
 def test_the_legend_of_profiles_names_what_is_drawn(certainty: float, *, drawn: bool) -> None:
     values = np.geomspace(0.5, 2.0, 41)

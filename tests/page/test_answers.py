@@ -3,13 +3,13 @@ from biogrip_study.page import answers
 TITLES = {"cell": "A cell", "drop": "A drop"}
 
 
-def covered(case: str, quantity: str, hits: str, runs: str = "20") -> dict[str, str]:
-    return {"case": case, "quantity": quantity, "shown_determined": hits, "shown_seeds": runs}
+def counted(case: str, quantity: str, verdict: str, hits: str) -> dict[str, str]:
+    return {"case": case, "quantity": quantity, "verdict": verdict, "reached": hits, "seeds": "20"}
 
 
 def test_a_row_a_sample_tells_how_many_traces_determine_a_quantity() -> None:
-    rows = [covered("cell", "k", "20"), covered("cell", "c_p", "0")]
-    rows += [covered("drop", "k", "3"), covered("drop", "c", "", "")]
+    rows = [counted("cell", "k", "determined", "20"), counted("cell", "c_p", "bounded above", "20")]
+    rows += [counted("drop", "k", "bounded above", "17"), counted("drop", "k", "determined", "3")]
     assert answers.rows_of_determined(rows, TITLES) == [
         {"sample": "A cell", "k": "all: 20 of 20", "c_p": "none: 0 of 20"},
         {"sample": "A drop", "k": "some: 3 of 20", "c_p": ""},

@@ -88,9 +88,9 @@ def test_the_page_answers_first_and_from_its_tables(opened: Opened, report: Path
         legible(answers.say_which_method_finds_it(compared, own)),
     ]
     table = page.locator("h1 + .split .answers .share")
-    counts = read_table(tables / "coverage.csv")
-    expected = [f"{row['shown_determined']} of {row['shown_seeds']}" for row in counts]
-    assert [" ".join(it.split()[1:]) for it in table.locator("td").all_inner_texts()] == expected
+    (counted,) = answers.rows_of_determined(read_table(tables / "verdict_counts.csv"), titles)
+    cells = [": ".join(it.split(maxsplit=1)) for it in table.locator("td").all_inner_texts()]
+    assert cells == [*counted.values()][1:]
     # Wilson's limits of 0 of 1 and 1 of 1.
     said = " ".join(page.locator(".narrow + p.soft").inner_text().split())
     assert "0 of 1 means at most 79 % of all traces, 1 of 1 at least 21 %. Sums hold" in said

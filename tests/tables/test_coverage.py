@@ -47,7 +47,7 @@ def write_intervals(file: Path, rows: list[tuple[Any, ...]], quantities: Sequenc
 QUANTITIES = "k", "k_p", "c", "c_p", "c + c_p"
 
 
-def test_verdicts_are_counted_beside_intervals(tmp_path: Path) -> None:
+def test_intervals_and_verdicts_are_counted(tmp_path: Path) -> None:
     rows = [
         # Of k = 1 three intervals, two of which hold it; two seeds judged in full.
         (CASE, "k", 0, 1.01, 0.9, 1.1, "determined", 1.005, 1.2),
@@ -64,19 +64,18 @@ def test_verdicts_are_counted_beside_intervals(tmp_path: Path) -> None:
     rows += [(CASE, quantity, seed, *untold) for seed in (0, 2) for quantity in ("c", "c + c_p")]
     file = write_intervals(tmp_path / CASE / "seeds_0-2.csv", rows, QUANTITIES)
     every_other = study_of(OVERLAY.replace("0.9}", "0.9, verdicts_every: 2}"))
-    made = coverage(every_other, [file])
-    found = {row["quantity"]: row for row in made.rows}
-    assert list(found) == ["k", "k_p", "c_p"]
-    assert (found["k_p"]["target"], found["k_p"]["shown_one_sided_true"]) == (1e-4, 1)
-    k, c_p = found["k"], found["c_p"]
-    assert (k["seeds"], k["confidence_percent"]) == (3, 90.0)
+    (k,) = coverage(every_other, [file]).rows
+    assert (k["quantity"], k["seeds"], k["confidence_percent"]) == ("k", 3, 90.0)
     assert k["coverage_percent"] == pytest.approx(100 * 2 / 3)
     assert k["bias_percent"] == pytest.approx(100 * np.mean(np.log([1.01, 1.02, 1.3])))
-    shown = ("seeds", "determined", "determined_true", "one_sided", "one_sided_true")
-    assert [k[f"shown_{name}"] for name in shown] == [2, 1, 0, 1, 1]
-    assert [c_p[f"shown_{name}"] for name in shown] == [2, 0, 0, 2, 1]
-    assert "bound_percent" not in c_p
-    assert "in one of 2 seeds" in str(made)
+    counted = verdict_counts(every_other, [file]).rows
+    found = {(row["quantity"], row["verdict"]): row for row in counted}
+    assert {row["seeds"] for row in counted} == {2}
+    names = "target", "reached", "true"
+    assert [found["k", "determined"][name] for name in names] == [1.0, 1, 0]
+    assert [found["k", "bounded below"][name] for name in names] == [1.0, 1, 1]
+    assert [found["k_p", "bounded above"][name] for name in names] == [1e-4, 1, 1]
+    assert [found["c_p", "bounded above"][name] for name in names] == [1e-3, 2, 1]
     # A batch that lost its end is refused, whatever is left of it.
     lines = file.read_text().splitlines(keepends=True)
     for kept in range(1, len(lines)):

@@ -14,7 +14,7 @@ COMPARED = TOLD | dict.fromkeys(("errors", "methods", "overview"), 1)
 # Of a simulated case, from its traces to their judgement, with one batch of them; and what of the
 # study reads these.
 TRACES = {"measurement": 1, "identification": 2, "model_fits": 1, "intervals": 1, "judgement": 1}
-TRACES |= {"evidence": 1, "readings_of_case": 1, "models": 1, "coverage": 1}
+TRACES |= dict.fromkeys(("evidence", "readings_of_case", "models", "coverage", "verdict_counts"), 1)
 # Figures of a simulated case and of a recorded trace.
 DRAWN = {"case_figures": 1, "recorded_case_figures": 1, "summary": 2}
 CELL = {"sample": {"model": "liquid_drop", "k": 20.0, "k_p": 5.0, "c": 80.0}}

@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+import biogrip_study.records.identifications as records
 from biogrip.arrays import Array
 from biogrip.config.source import overlaid
+from biogrip.files import write_rows
 from biogrip.fit.least_squares import fit_from
 from biogrip.fit.problem import Fit, TraceProblem
 from biogrip.keys import built
 from biogrip.physics.noise import add_noise, rms, stream
-from biogrip.physics.sample_model import SINGLE_BRANCH
 from biogrip.terminal import Progress
 from biogrip_study.config.case_blocks import CaseBlock
 from biogrip_study.config.study import Case
 from biogrip_study.methods.genetic import identify_many
-from biogrip_study.records.identifications import READING_FILE
 from biogrip_study.records.traces import read_target
 from biogrip_study.stages.identification import seed_groups
 from biogrip_study.stages.job import arguments, logged
@@ -40,7 +40,8 @@ def identify_reading(case: Case, reading: str, target: Path, rows: Path) -> None
     time_s, _, clean = read_target(target, case.times_s)
     if (read.gripper, len(read.times_s)) != (case.gripper, len(time_s)):
         time_s, (clean, _) = read.times_s, response(read, read.times_s)
-    READING_FILE.write(rows, _rows(read, reading, time_s, clean))
+    header = *records.identification_columns(read.sample.model), records.LAST_IMPROVEMENT
+    write_rows(rows, header, _rows(read, reading, time_s, clean))
 
 
 def _rows(case: Case, name: str, time_s: Array, clean: Array) -> Iterator[tuple[str | int, ...]]:
@@ -50,15 +51,9 @@ def _rows(case: Case, name: str, time_s: Array, clean: Array) -> Iterator[tuple[
         traces = [add_noise(clean, case.noise, rng, time_s) for rng in rngs]
         answers = _best(case, name, seeds, experiment.of_each(time_s, traces))
         for seed, trace, answer in zip(seeds, traces, answers, strict=True):
-            names = experiment.searched.names
-            values = {**experiment.fixed, **dict(zip(names, answer.parameters, strict=True))}
             falls = np.flatnonzero(np.diff(answer.history.best_misfit) < 0)
-            yield (
-                *(case.name, name, seed),
-                *(f"{values.get(p.name, 0.0):.6g}" for p in SINGLE_BRANCH),
-                *(f"{answer.misfit:.6e}", f"{rms(trace - clean):.6e}", answer.generations),
-                int(falls[-1]) + 1 if len(falls) else 0,
-            )
+            found = records.row_of(experiment, answer, rms(trace - clean))
+            yield case.name, name, seed, *found, int(falls[-1]) + 1 if len(falls) else 0
         progress.done(len(seeds))
 
 

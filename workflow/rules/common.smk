@@ -120,9 +120,8 @@ calibration_of = of_case("results/calibrations/{case}.yaml", CALIBRATED)
 # Tables and figures of the study, of what there is in it, and those of a case.
 TABLES = ["errors"]
 TABLES += ["methods"] if STUDY.simulated else []
-TABLES += ["coverage"] if STUDY.covered else []
+TABLES += ["coverage", "verdict_counts"] if STUDY.covered else []
 TABLES += ["models"] if SELECTING else []
-TABLES += ["verdict_counts"] if STUDY.counted else []
 # The search ranges of recorded traces follow from them.
 INPUTS = ["gene_ranges", "parameter_ranges"] if STUDY.simulated else []
 HAS_GRIPPER = any(case.instrument.has_jaws for case in STUDY.cases.values())

@@ -106,7 +106,8 @@ rule evidence:
     params:
         **settings_of(
             *"methods seeds evaluation actuator gripper search_range".split(),
-            *keys_of_cases(STUDY, *FIT, "title", "published", "models", *SAMPLING, NOISE),
+            *keys_of_cases(STUDY, *FIT, "title", "published"),
+            *keys_of_cases(STUDY, "contact", "models", *SAMPLING, NOISE),
         ),
     message:
         "Holding the paper's numbers against each other"
@@ -170,7 +171,8 @@ rule protocols:
     params:
         **settings_of(
             *"methods actuator".split(),
-            *keys_of_cases(STUDY, *FIT, "title", "published", "models", *SAMPLING, NOISE),
+            *keys_of_cases(STUDY, *FIT, "title", "published"),
+            *keys_of_cases(STUDY, "contact", "models", *SAMPLING, NOISE),
         ),
     message:
         "Comparing the paper's protocol with others"
@@ -202,8 +204,8 @@ rule claims:
     params:
         **settings_of(
             *"study_seed methods seeds evaluation actuator gripper readings".split(),
-            *keys_of_cases(STUDY, *FIT, "title", "published", "calibration", "models"),
-            *keys_of_cases(STUDY, *SAMPLING, NOISE),
+            *keys_of_cases(STUDY, *FIT, "title", "published", "calibration"),
+            *keys_of_cases(STUDY, "contact", "models", *SAMPLING, NOISE),
         ),
     message:
         "Judging the claims of the paper"

@@ -134,14 +134,14 @@ rule coverage:
 
 rule verdict_counts:
     input:
-        intervals=files("results/coverage/{case}/{batch}.csv", STUDY.counted),
+        intervals=files("results/coverage/{case}/{batch}.csv", STUDY.covered),
     output:
         table="results/tables/verdict_counts.csv",
         page=page_of_table("verdict_counts"),
     log:
         "results/logs/verdict_counts.log",
     params:
-        **settings_of("actuator", *keys_of_cases(STUDY.of(STUDY.counted), *FIT, "identifiability")),
+        **settings_of("actuator", *keys_of_cases(STUDY.of(STUDY.covered), *FIT, "identifiability")),
         stages=["biogrip_study.tables.study.verdict_counts"],
     message:
         "Counting verdicts"

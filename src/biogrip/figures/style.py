@@ -4,7 +4,7 @@ Ticks of logarithmic axes are plain text, as math text would take a tenth of a f
 """
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
@@ -100,32 +100,6 @@ def panel(axes: Axes, letter: str, title: str, most_letters: int = 34) -> None:
     short = title if len(title) <= most_letters else f"{title[: most_letters - 1]}…"
     place = axes.set_title(f"     {short}", fontsize=_PANEL_SIZE).get_transform()
     axes.text(0, 1, letter, transform=place, fontsize=_PANEL_SIZE, fontweight="bold")
-
-
-def points_within(
-    axes: Axes,
-    points: Array,
-    low: Sequence[float] | Array,
-    high: Sequence[float] | Array,
-    style: dict[str, Any],
-    *,
-    edge_size: float,
-    labels: tuple[str, str] = ("", ""),
-) -> None:
-    """Draw points, (n, 2), and at the edge triangles for those not between low and high.
-
-    The labels are those of points within and of points beyond.
-    """
-    beyond = (points > high) | (points < low)
-    inside = ~beyond.any(axis=1)
-    axes.plot(*points[inside].T, **style, label=labels[0] or None)
-    right = points[:, 0] > high[0]
-    above, below = (points[:, 1] > high[1]) & ~right, (points[:, 1] < low[1]) & ~right
-    for marker, outside in ((">", right), ("^", above), ("v", below)):
-        if np.any(outside):
-            at_edge = np.clip(points[outside], low, high).T
-            edge = style | {"marker": marker, "markersize": edge_size}
-            axes.plot(*at_edge, **edge, label=labels[1] or None)
 
 
 def save(drawn: Figure, output: Path, *prints: Path) -> None:

@@ -86,7 +86,7 @@ class Identifiability(IntervalBlock):
     the Cramér-Rao bound, if there is noise; 0 leaves that out."""
     verdicts_every: Annotated[int, Field(ge=1, le=1_000_000)] = 5
     """One in so many of these seeds also gets the verdicts that users are shown, from whole
-    profiles. By default 5; with 1 a table counts them."""
+    profiles, by default 5; a table counts them."""
 
 
 def _of_methods() -> type[Block]:

@@ -143,12 +143,6 @@ class Study:
         return self._where(lambda case: case.coverage_seeds > 0)
 
     @property
-    def counted(self) -> list[str]:
-        """Names of those of which every trace gets the verdicts that users are shown."""
-        cases = ((name, self.cases[name].block.identifiability) for name in self.covered)
-        return [name for name, block in cases if block.verdicts_every == 1]
-
-    @property
     def published(self) -> list[str]:
         """Names of cases that the paper reports results of."""
         return self._where(lambda case: case.published.table is not None)

@@ -4,13 +4,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from biogrip.arrays import Array
-from biogrip.figures import style
 from biogrip.figures.fit import FittedTrace, draw_fit, fit_of
 from biogrip.figures.likelihood import draw_profiles_of
 from biogrip_study.config.study import Case
@@ -22,24 +18,6 @@ from biogrip_study.stages.judgement import JUDGED_SEED
 
 SHOWN_SEEDS = 100
 """Most seeds drawn individually; figures show the first ones."""
-
-
-DOTS: dict[str, Any] = {
-    "linestyle": "", "marker": "o", "markersize": 2.2, "markeredgewidth": 0, "alpha": 0.55,
-    "clip_on": False, "in_layout": False,
-}  # fmt: skip
-"""Look of runs; points at the edge would make the layout leave them room."""
-
-
-def draw_runs(
-    axes: Axes, place: float, values: Array, ends: tuple[float, float], color: str
-) -> None:
-    """Draw values of runs, (n,), about a place, and triangles at the edge for those beyond."""
-    # A fixed sideways scatter keeps points apart.
-    sideways = place + 0.6 * ((np.arange(len(values)) * 0.618034) % 1 - 0.5)
-    low, high = (-np.inf, ends[0]), (np.inf, ends[1])
-    points, look = np.column_stack((sideways, values)), DOTS | {"color": color}
-    style.points_within(axes, points, low, high, look, edge_size=3)
 
 
 def first_of_basins(identified: pd.DataFrame, case: Case) -> dict[str, pd.Series]:
@@ -74,11 +52,6 @@ def _fit_of_seed(
     return fit_of(
         experiment, values, made.time_s, made.readings[seed], made.known.get("sd"), made.target
     )
-
-
-def first_seeds(identified: pd.DataFrame) -> pd.DataFrame:
-    """Return the identifications of seeds that are drawn individually."""
-    return identified[identified["seed"] < SHOWN_SEEDS]
 
 
 def seeds_in_words(count: int) -> str:

@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import biogrip_study.records.identifications as records
+from biogrip.arrays import Array
 from biogrip.figures import style
 from biogrip.figures.fit import draw_traces
 from biogrip.judging.likelihood import parameters_and_sum, quantity_value
@@ -19,6 +20,12 @@ from biogrip_study.figures import case_fit
 # End of the axis of identified over target values.
 _WORST = 1e3
 _TITLE_LETTERS = 19
+# Look of runs; points at the edge would make the layout leave them room.
+_DOTS: dict[str, Any] = {
+    "linestyle": "", "marker": "o", "markersize": 2.2, "markeredgewidth": 0, "alpha": 0.55,
+    "clip_on": False, "in_layout": False,
+}  # fmt: skip
+_AT_EDGE = 3.0
 
 
 def draw_overview(
@@ -40,7 +47,8 @@ def draw_overview(
         identified = records.read_identifications(path, case, study.shown_method.name)
         quantities = records.read_verdicts(judged)["quantities"]
         bounded = {item["quantity"] for item in quantities if item["verdict"] != BOUNDED_ABOVE}
-        _draw_ratios(scatter, case, case_fit.first_seeds(identified), bounded)
+        first = identified[identified["seed"] < case_fit.SHOWN_SEEDS]
+        _draw_ratios(scatter, case, first, bounded)
         scatter.tick_params(labelleft=index == 0)
         style.panel(scatter, "bcd"[index], case.title, most_letters=_TITLE_LETTERS)
     axes[1].set_ylabel("identified / target")
@@ -62,7 +70,7 @@ def _draw_ratios(axes: Axes, case: Case, fits: pd.DataFrame, bounded: set[str]) 
         "other fits": (~reached, style.ALL_SEEDS),
     }
     for label, (_, color) in looks.items():
-        axes.plot([], [], **case_fit.DOTS | {"color": color}, label=label)
+        axes.plot([], [], **_DOTS | {"color": color}, label=label)
     axes.plot([], [], "^", color=style.TARGET, markersize=1.6, label="beyond the axis")
     axes.axhline(1, color=style.TARGET, linewidth=0.8, label="truth")
     if case.published.identified:
@@ -78,9 +86,21 @@ def _draw_ratios(axes: Axes, case: Case, fits: pd.DataFrame, bounded: set[str]) 
         ticks.append(quantity.symbol.replace(" ", ""))
         ratios = values.to_numpy(float) / target
         for which, color in reversed(looks.values()):
-            case_fit.draw_runs(axes, x, ratios[which], (1 / _WORST, _WORST), color)
+            _draw_runs(axes, x, ratios[which], color)
         if (paper := quantity_value(label, case.published.identified)) is not None:
             shown = np.clip(paper / target, 1 / _WORST, _WORST)
             axes.plot([x - 0.4, x + 0.4], [shown, shown], color=style.PAPER)
     axes.set(yscale="log", ylim=(1 / (2 * _WORST), 2 * _WORST))
     axes.set_xticks(range(len(ticks)), ticks)
+
+
+def _draw_runs(axes: Axes, place: float, ratios: Array, color: str) -> None:
+    """Draw ratios of runs, (n,), about a place, and triangles at the edge for those beyond."""
+    # A fixed sideways scatter keeps points apart.
+    sideways = place + 0.6 * ((np.arange(len(ratios)) * 0.618034) % 1 - 0.5)
+    shown, look = np.clip(ratios, 1 / _WORST, _WORST), _DOTS | {"color": color}
+    within = shown == ratios
+    axes.plot(sideways[within], shown[within], **look)
+    for marker, beyond in (("^", ratios > _WORST), ("v", ratios < 1 / _WORST)):
+        edge = look | {"marker": marker, "markersize": _AT_EDGE}
+        axes.plot(sideways[beyond], shown[beyond], **edge)

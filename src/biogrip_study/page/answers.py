@@ -4,6 +4,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 
 from biogrip.digits import legible, plain, with_unit
+from biogrip.judging.profiles import DETERMINED
 
 TableRow = Mapping[str, str]
 
@@ -26,18 +27,19 @@ def say_what_the_study_gives(
 
 
 def rows_of_determined(
-    coverage: Iterable[TableRow], titles: Mapping[str, str]
+    counts: Iterable[TableRow], titles: Mapping[str, str]
 ) -> list[dict[str, str]]:
     """Return in how many traces of each sample each quantity is determined, a row a sample.
 
-    Rows are those of the table of coverage; only verdicts from whole profiles count.
+    Rows are those of the table of verdict counts.
     """
     rows: dict[str, dict[str, str]] = defaultdict(dict)
-    for row in coverage:
-        if runs := int(row["shown_seeds"] or 0):
-            count = int(row["shown_determined"])
-            word = "all" if count == runs else "some" if count else "none"
-            rows[row["case"]][row["quantity"]] = f"{word}: {count} of {runs}"
+    for row in counts:
+        told, runs = rows[row["case"]], int(row["seeds"])
+        told.setdefault(row["quantity"], f"none: 0 of {runs}")
+        if row["verdict"] == DETERMINED:
+            word = "all" if int(row["reached"]) == runs else "some"
+            told[row["quantity"]] = f"{word}: {row['reached']} of {runs}"
     names = dict.fromkeys(name for row in rows.values() for name in row)
     return [
         {"sample": titles[case], **{name: row.get(name, "") for name in names}}

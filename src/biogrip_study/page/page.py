@@ -31,7 +31,7 @@ from biogrip_study.stages.judgement import JUDGED_SEED
 _MOST_PICTURE_LETTERS = 2_800_000
 _LIBRARIES = ("numpy", "scipy", "pandas", "matplotlib", "snakemake")
 # Tables that answers are written from.
-_ANSWERING = "coverage", "methods", "tables_5_to_7"
+_ANSWERING = "verdict_counts", "methods", "tables_5_to_7"
 # Tables under what is reconstructed; the others are under their heading.
 _EVIDENCE = ("gripper", "gene_ranges", "evidence", "printed_values")
 # What only the paper's page shows of the gripper and the default search ranges.
@@ -149,16 +149,16 @@ def write_report(
 
 def _answered(study: Study, downloads: Sequence[Path]) -> dict[str, Any]:
     """Return the answers, and results beside the paper's."""
-    coverage, methods, beside = (
+    counts, methods, beside = (
         [row for csv in downloads if csv.stem == name for row in read_table(csv)]
         for name in _ANSWERING
     )
     titles = {case.name: case.title for case in study.cases.values()}
     asked = methods, study.shown_method.title
     who = "Run again, the paper's" if study.published else "The"
-    runs = max((int(row["shown_seeds"] or 0) for row in coverage), default=0)
+    runs = max((int(row["seeds"]) for row in counts), default=0)
     return {
-        "determined": answers.rows_of_determined(coverage, titles),
+        "determined": answers.rows_of_determined(counts, titles),
         "runs": runs,
         "none_at_most": share_with_limits(0, runs)[2] if runs else 1.0,
         "provided": PROVIDED,

@@ -50,22 +50,16 @@ INTERVALS = RowFile(
 limits. For some seeds, all quantities have the verdict and limits that users are shown, from whole
 profiles."""
 
-READING_FILE = RowFile(
-    "readings",
-    (
-        *("case", "reading", "seed"),
-        *(parameter.column for parameter in SINGLE_BRANCH),
-        *("misfit", "noise_rms", "generations", "last_improvement"),
-    ),
-    words=("case", "reading"),
-)
+LAST_IMPROVEMENT = "last_improvement"
+"""Last column of identifications under a reading of the paper, which is their method: the last
+generation with a lower misfit."""
 
 
 def read_readings(path: Path, case: Case) -> "pd.DataFrame":
     """Read what the reading that a file is named like found; parameters stand by name."""
-    seeds = range(case.seeds)
-    frame = READING_FILE.read(path, case=[case.name], reading=[path.stem], seed=seeds)
-    return frame.rename(columns={p.column: p.name for p in SINGLE_BRANCH})
+    names = {p.column: p.name for p in SINGLE_BRANCH}
+    frame = _read_methods(path, case, [path.stem], range(case.seeds))
+    return frame.rename(columns={"method": "reading", **names})
 
 
 def parameters_in_file(model: SampleModel) -> tuple[Parameter, ...]:

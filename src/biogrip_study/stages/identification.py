@@ -30,9 +30,9 @@ from biogrip_study.records.traces import Measurements, read_measurements
 _JOINT = 63
 
 
-def seed_groups(seeds: Sequence[int], times: int = 1) -> Iterator[Sequence[int]]:
+def seed_groups(seeds: Sequence[int]) -> Iterator[Sequence[int]]:
     """Return the seeds of a batch in groups."""
-    return (seeds[some] for some in parts(len(seeds), times * _JOINT))
+    return (seeds[some] for some in parts(len(seeds), _JOINT))
 
 
 def identify_seeds(

@@ -91,8 +91,6 @@ def _write_diagnosis(path: Path, case: Case, diagnosis: Diagnosis, more: dict[st
 _GAIN_BY_ROUNDING = 1e-3
 # Significant digits, and those of values known to within a relative `_NARROW`.
 _ESTIMATE_DIGITS, _MORE_DIGITS, _NARROW = 5, 9, 1e-3
-# Local fits need less memory per seed than populations.
-_GROUPS_AT_ONCE = 2
 
 
 def estimate_intervals(
@@ -120,7 +118,7 @@ def estimate_intervals(
     often = case.block.identifiability.verdicts_every
     progress = Progress(f"{case.name}, intervals", len(seeds))
     rows: list[tuple[Any, ...]] = []
-    for group in seed_groups(seeds, _GROUPS_AT_ONCE):
+    for group in seed_groups(seeds):
         rngs = [experiment.stream("noise", seed) for seed in group]
         traces = [add_noise(rotation, case.noise, rng, time_s) for rng in rngs]
         fits = fit_least_squares(

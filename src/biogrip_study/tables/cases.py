@@ -1,4 +1,4 @@
-"""What is found of each case: Tables 5 to 7 beside the paper's, and verdicts on its quantities.
+"""What is found of each case, as in the paper's Tables 5 to 7, and verdicts on its quantities.
 
 What the paper's printed values and errors leave of the numbers that it printed, `interval_of` says.
 """
@@ -23,8 +23,6 @@ _QUANTILES = {"p05": 0.05, "p25": 0.25, "median": 0.5, "p75": 0.75, "p95": 0.95}
 _ERROR_COLUMNS = (
     *titled("case", "parameter", "unit"),
     Column("target", "Target", 4),
-    Column("paper_identified", "Paper", 4),
-    Column("paper_error_percent", "Paper error %", 2),
     Column("basin", "Runs that end"),
     Column("seeds", "Seeds"),
     *(
@@ -71,7 +69,7 @@ def errors_of_case(case: Case, identifications: Path) -> ShownTable:
             }
             for name, share in _QUANTILES.items():
                 of_quantity[f"{name}_identified"] = values.quantile(share)
-            rows.append(of_case | of_quantity | _of_paper(case, quantity.label))
+            rows.append(of_case | of_quantity)
     number = f"Table {case.published.table}. " if case.published.table is not None else ""
     caption = (
         f"{number}{case.title}: target and identified parameters over "
@@ -90,27 +88,12 @@ def error_percent(target: float | None, identified: Any) -> Any:
     return 100 * (target - identified) / target if target else np.nan * identified
 
 
-def _of_paper(case: Case, label: str) -> Row:
-    """Return the paper's value and error; of a sum, what its members' printed errors make them."""
-    told, printed = value_in_case(case, label.split(" + ")), case.published
-    if told is None:
-        return {}
-    value, error = told[0], error_percent(quantity_value(label, case.parameters), told[0])
-    if label in printed.identified:
-        value, error = printed.identified[label], printed.error_percent.get(label)
-    return {"paper_identified": value, "paper_error_percent": error}
-
-
 def errors(study: Study, identifications: list[Path]) -> ShownTable:
     """Join the tables of errors of all cases, given the identifications of each, CSV."""
     files = zip(study.cases.values(), identifications, strict=True)
-    rows = [dict(row) for case, file in files for row in errors_of_case(case, file).rows]
-    for row in rows:
-        # Text, as ">100", stays; not every case or parameter has one.
-        with suppress(ValueError, TypeError, KeyError):
-            row["paper_error_percent"] = float(row["paper_error_percent"])
-    columns = _error_columns(study)
-    return ShownTable(f"Identification errors of all cases. {_BASINS}", columns, rows)
+    rows = [row for case, file in files for row in errors_of_case(case, file).rows]
+    caption = f"Identification errors of all cases. {_BASINS}"
+    return ShownTable(caption, _error_columns(study), rows)
 
 
 def _verdict_columns(confidence: float) -> tuple[Column, ...]:

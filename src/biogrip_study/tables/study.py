@@ -10,7 +10,7 @@ from scipy.special import betaincinv
 import biogrip_study.records.identifications as records
 from biogrip.fit.nested_fits import aic_and_bic
 from biogrip.judging.likelihood import Quantity, bounds_percent, parameters_and_sum, quantity_value
-from biogrip.judging.profiles import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED, NOT_DETERMINED
+from biogrip.judging.profiles import DETERMINED, NOT_DETERMINED
 from biogrip.levels import WIDE
 from biogrip_study.config.study import Case, Study
 from biogrip_study.methods.registry import METHODS
@@ -122,14 +122,7 @@ _COVERAGE_COLUMNS = (
     Column("confidence_percent", "Confidence %", 4),
     Column("coverage_percent", "Intervals that hold the truth %", 3),
     Column("seeds", "Seeds"),
-    Column("shown_seeds", "Seeds judged in full"),
-    Column("shown_determined", "Determined"),
-    Column("shown_determined_true", "Determined and true"),
-    Column("shown_one_sided", "Bounded on one side"),
-    Column("shown_one_sided_true", "Bounded and true"),
 )
-# Verdicts that are counted together.
-_COUNTED = {"determined": (DETERMINED,), "one_sided": (BOUNDED_BELOW, BOUNDED_ABOVE)}
 
 
 def coverage(study: Study, intervals: list[Path]) -> ShownTable:
@@ -142,22 +135,29 @@ def coverage(study: Study, intervals: list[Path]) -> ShownTable:
     }
     for case, head, estimated in _by_quantity(study, intervals):
         fitted = estimated[estimated["estimate"].notna()]
-        shown = estimated[estimated["verdict"].notna()]
-        if fitted.empty and not np.any(shown["verdict"] != NOT_DETERMINED):
+        if fitted.empty:
             continue
-        truth = head["target"] or 0.0
-        of_fits = _spreads(fitted, truth, bounds[case.name, head["quantity"]], case.confidence)
-        rows.append({**head, "target": truth, **of_fits, **_verdicts_shown(shown, truth)})
+        errors = np.log(fitted["estimate"].to_numpy(float) / head["target"])
+        spread, bound = 100 * np.std(errors, ddof=1), bounds[case.name, head["quantity"]]
+        rows.append(
+            {
+                **head,
+                "bound_percent": bound,
+                "spread_percent": spread,
+                "spread_over_bound": spread / bound,
+                "bias_percent": np.mean(100 * errors),
+                "confidence_percent": 100 * case.confidence,
+                "coverage_percent": 100 * np.mean(_holds(fitted, head["target"])),
+                "seeds": len(fitted),
+            }
+        )
     caption = (
         "Least squares over many seeds, for every quantity that a case's traces should determine: "
         "standard deviation of the estimates' logarithms beside the Cramér-Rao bound, and how "
         "often the intervals hold the truth. The bound is for a simpler problem than that of the "
         "fits: parameters without information in the traces are fixed. Fits search these too; as "
         "they are near zero they can only be overestimated, at the expense of others: hence the "
-        "bias, and a spread above the bound. On the right: verdicts from whole profiles, as users "
-        "are shown them, "
-        f"in {_judged_seeds(study)}, and how many of them are true; one-sided limits hold more "
-        "often than the confidence says."
+        "bias, and a spread above the bound."
     )
     return ShownTable(caption, _COVERAGE_COLUMNS, rows)
 
@@ -191,41 +191,6 @@ def read_intervals(study: Study, path: Path) -> pd.DataFrame:
     return records.INTERVALS.read(path, case=[case.name], quantity=every, seed=seeds_of(path.stem))
 
 
-def _judged_seeds(study: Study) -> str:
-    every = {case.block.identifiability.verdicts_every for case in study.cases.values()}
-    if len(every) > 1:
-        return "some seeds"
-    return "every seed" if 1 in every else f"one of {every.pop()} seeds"
-
-
-def _spreads(fitted: pd.DataFrame, truth: float, bound: float, confidence: float) -> Row:
-    """Return bound, spread and coverage of a quantity; nothing of one without intervals."""
-    if fitted.empty:
-        return {}
-    errors = np.log(fitted["estimate"].to_numpy(float) / truth)
-    spread = 100 * float(np.std(errors, ddof=1))
-    return {
-        "bound_percent": bound,
-        "spread_percent": spread,
-        "spread_over_bound": spread / bound,
-        "bias_percent": np.mean(100 * errors),
-        "confidence_percent": 100 * confidence,
-        "coverage_percent": 100 * np.mean(_holds(fitted, truth)),
-        "seeds": len(fitted),
-    }
-
-
-def _verdicts_shown(judged: pd.DataFrame, truth: float) -> Row:
-    """Count verdicts from whole profiles, and the true ones among them."""
-    counts: Row = {"shown_seeds": len(judged)}
-    held = _holds(judged, truth, "shown_")
-    for name, verdicts in _COUNTED.items():
-        chosen = judged["verdict"].isin(verdicts)
-        counts[f"shown_{name}"] = int(np.sum(chosen))
-        counts[f"shown_{name}_true"] = int(np.sum(held[chosen]))
-    return counts
-
-
 def _holds(limits: pd.DataFrame, truth: float, which: str = "") -> "pd.Series[bool]":
     """Return whether limits hold the true value, (n_rows,); an open side does."""
     low, high = limits[f"{which}low"].fillna(0.0), limits[f"{which}high"].fillna(np.inf)
@@ -254,7 +219,7 @@ def verdict_counts(study: Study, intervals: list[Path]) -> ShownTable:
     ]
     percents = " or ".join(sorted({f"{100 * case.confidence:g}" for case in study.cases.values()}))
     caption = (
-        f"Verdicts from whole profiles at {percents} %, as users are shown them, in every seed: "
+        f"Verdicts from whole profiles at {percents} %, as users are shown them: "
         "how often each is reached, with the 95 % interval of its share, and how often its limits "
         "hold the true value, with the 95 % interval of that share (Clopper and Pearson)."
     )
