@@ -17,15 +17,11 @@ from biogrip.config.source import values_in
 from biogrip.digits import counted
 from biogrip.errors import nearest, nearest_three
 from biogrip.keys import CONFLICT, TWICE, Complaint, adapter, built, kind_of
-from biogrip.physics.instruments import ROTATION
-from biogrip.traces.columns import TIME_UNITS
 
 T = TypeVar("T")
 
 MISSING = "is missing and has no default."
 
-# Choices without a nearest one: a unit of almost the same name is a thousand times another.
-_WITHOUT_NEAREST = ([*TIME_UNITS], [*ROTATION.units])
 _BOUNDS = {"exclusiveMinimum": "greater than", "minimum": "at least", "maximum": "at most"}
 # Most errors that are explained, and most characters of a value that are shown.
 _MOST, _LONGEST = 1000, 40
@@ -89,8 +85,7 @@ def _text(path: Sequence[Hashable], leaf: "Schema", above: "Schema", error: Erro
             if usual := leaf.get("usual"):
                 near = nearest_three(found, [*choices, *usual])
                 return f"found {_shown(found)}. Did you mean {near}? All: biogrip identify -h."
-            hint = "" if choices in _WITHOUT_NEAREST else nearest(found, choices)
-            return f"found {_shown(found)}.{hint} Allowed: {', '.join(choices)}."
+            return f"found {_shown(found)}.{nearest(found, choices)} Allowed: {', '.join(choices)}."
         case "string_pattern_mismatch":
             return f"found {_shown(found)}, allowed is {leaf.get('form')}."
         case _ if error["type"] == TWICE:
