@@ -40,15 +40,18 @@ Complaint = tuple[tuple[Hashable, ...], str]
 CONFLICT, TWICE = "conflict", "twice"
 """Names of our own pydantic errors: keys that do not go together, and a repeated item."""
 
+
+def formed(pattern: str, form: str) -> Any:
+    """Return the annotation of text that a pattern describes, and its form in words."""
+    return Field(pattern=pattern, json_schema_extra={"form": form})
+
+
 Printed = Annotated[
     str,
-    Field(
-        max_length=60,
-        pattern=r"^[\w.,:;()/%'][\w .,:;()+/%'-]*$",
-        json_schema_extra={
-            "form": "text of 1 to 60 letters, digits, spaces and . , : ; ( ) + / % ' - _, not "
-            "beginning with a space, + or -"
-        },
+    formed(
+        r"^[\w.,:;()/%'][\w .,:;()+/%'-]{0,59}$",
+        "text of 1 to 60 letters, digits, spaces and . , : ; ( ) + / % ' - _, not beginning with a "
+        "space, + or -",
     ),
 ]
 """Text that is safe in tables, figures and file formats."""

@@ -14,8 +14,8 @@ from biogrip.errors import BiogripError
 from biogrip.fit.problem import GeneRange
 from biogrip.physics.gripper import torque
 from biogrip.physics.models import MODELS, Sample
-from biogrip_study.config.case_blocks import Published
 from biogrip_study.config.study import Study
+from biogrip_study.config.study_blocks import Published
 from biogrip_study.records.identifications import (
     READING_FILE,
     identification_columns,

@@ -9,7 +9,7 @@ from scipy.stats import binomtest
 
 from biogrip.physics.models import MODELS, Sample
 from biogrip.records import write_object
-from biogrip_study.config.case_blocks import Published
+from biogrip_study.config.study_blocks import Published
 from biogrip_study.methods.registry import METHODS
 from biogrip_study.records.identifications import (
     ALL,

@@ -16,8 +16,8 @@ from biogrip.keys import built
 from biogrip.physics.noise import add_noise, rms, stream
 from biogrip.physics.sample_model import SINGLE_BRANCH
 from biogrip.terminal import Progress
-from biogrip_study.config.case_blocks import CaseBlock
 from biogrip_study.config.study import Case
+from biogrip_study.config.study_blocks import CaseBlock
 from biogrip_study.methods.genetic import identify_many
 from biogrip_study.records.identifications import READING_FILE
 from biogrip_study.records.traces import read_target
