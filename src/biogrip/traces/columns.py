@@ -303,15 +303,13 @@ def listed(names: list[str], most: int = _MOST_LISTED) -> str:
 
 def trace_file_problem(path: str | Path) -> str | None:
     """Return what is wrong with the path of a trace, or None if it is a file."""
-    file, shown = Path(path), visible(path)
-    shown = shown if len(shown) <= _LONGEST_PATH else f"{shown[:_LONGEST_PATH]}..."
+    file, shown = Path(path), f"{visible(path):.{_LONGEST_PATH}}"
     folder = "" if file.is_absolute() else f" in {visible(file.parent.absolute())}"
-    found = f"there is no file {shown}{folder[:_LONGEST_PATH]}."
+    found = f"there is no file {shown}{folder:.{_LONGEST_PATH}}."
     try:
-        if file.is_file():
-            return None
         if file.exists():
-            return f"found '{shown}', which is no regular file; allowed is one."
+            regular = f"found '{shown}', which is no regular file; allowed is one."
+            return None if file.is_file() else regular
         beside = [str(other) for other in file.parent.glob("*") if other.is_file()]
     except (OSError, ValueError):
         # A name that is too long or invalid for the system: no neighbours to suggest.

@@ -251,7 +251,7 @@ def _with_names(lines: Sequence[str], wanted: set[str]) -> tuple[str, list[tuple
     if first and common < len(wanted):
         kept = [own for own in kept if not _COMMENT.match(own[0])]
         if all(map(str.isdecimal, wanted)):
-            names = range(1, len(_split(first[0], separator)) + 1)
+            names = range(1, len(_cells_of(first[0], separator)) + 1)
             kept.insert(kept.index(first), (separator.join(map(str, names)), 0))
         else:
             comments = [_said(line, bare=True) for line in lines if _COMMENT.match(line)]
@@ -300,19 +300,15 @@ def _said(line: str, *, bare: bool = False) -> str:
 def _width(lines: Sequence[tuple[str, int]], separator: str) -> int:
     """Return the number of cells in the last row of numbers."""
     rows = (line for line, _ in reversed(lines) if _ROW.match(line + " "))
-    return len(_split(next(rows, ""), separator))
+    return len(_cells_of(next(rows, ""), separator))
 
 
-def _split(line: str, separator: str) -> list[str]:
-    if separator != BLANKS:
-        return line.split(separator)
-    return [line] if _OTHERWISE.search(line) else _CELL.findall(line)
-
-
-def _cells_of(line: str, separator: str, width: int) -> list[str]:
+def _cells_of(line: str, separator: str, width: int = 0) -> list[str]:
     """Return the cells of a line; words with single blanks are one if there are then as many."""
     if separator != BLANKS:
         return line.split(separator)
+    if _OTHERWISE.search(line):
+        return [line]
     wide = _WIDE_GAP.split(line.strip())
     return wide if len(wide) == width else _CELL.findall(line)
 
@@ -330,9 +326,9 @@ def _separator(
         common = 0
         for row in headers:
             wide = _WIDE_GAP.split(row.strip()) if separator == BLANKS else []
-            of = (len(wanted & _names(cells)) for cells in (_split(row, separator), wide))
+            of = (len(wanted & _names(cells)) for cells in (_cells_of(row, separator), wide))
             common = max(common, *of)
-        parted = (len(_split(line, separator)) > 1 for line, _ in lines[:_LINES_SEARCHED])
+        parted = (len(_cells_of(line, separator)) > 1 for line, _ in lines[:_LINES_SEARCHED])
         return common, sum(parted)
 
     # Where as many lines have commas as tabs or semicolons, these are decimal commas.
@@ -442,11 +438,8 @@ def _with_header_rows(sheet: Sheet, table: Table, columns: MeasurementBlock) -> 
     for row in range(table.at - 1, max(table.at - _MOST_HEADER_ROWS, 0) - 1, -1):
         if (count := _count_units(sheet.cells[row], columns, read)) > 1:
             units_in[row] = count
-    units_at = max(units_in, key=lambda row: units_in[row], default=None)
-    if units_at is not None and not units_in[units_at]:
-        # Of no unit that is known: what is in brackets, or below the names of a step.
-        likely = (row for row in below if all(map(in_brackets, filter(None, sheet.cells[row]))))
-        units_at = next(likely, below[0] if table.is_step else None)
+    with_units = (row for row, count in units_in.items() if count)
+    units_at = max(with_units, key=lambda row: units_in[row], default=None)
     units = None if units_at is None else sheet.cells[units_at, : len(table.names)].tolist()
     first = max(below, default=table.at) + 1
     return replace(table, units=units, units_at=units_at, first=first)
@@ -502,8 +495,6 @@ def _likely_table(sheet: Sheet) -> Table:
 
 def _end(sheet: Sheet, table: Table, following: Table) -> int:
     """Return the place after the rows of a table, where the preamble of the following begins."""
-    if following.is_step:
-        return max(following.at - 2, table.first)
     end = following.at
     while end > table.first and _in_preamble(sheet.cells[end - 1], len(table.names)):
         end -= 1
