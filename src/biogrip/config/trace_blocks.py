@@ -357,13 +357,10 @@ class SampleBlocks(ExperimentBlocks):
     @property
     def instrument_used(self) -> Instrument:
         """The instrument, by its kind, and by what the protocol holds and the trace is of."""
-        kind = of_kind(self.instrument)
-        bases = self.protocol.phases[0].bases
-        fitting = [some for some in kind if some.controlled.column in bases] or kind
-        if len(fitting) == 1 or not self.recorded:
-            return fitting[0]
-        named = [some for some in fitting if some.read.name in self.measurement.readings]
-        return (named or fitting)[0]
+        kind, held = of_kind(self.instrument), self.protocol.phases[0].bases
+        fitting = [used for used in kind if used.controlled.column in held] or kind
+        readings = self.measurement.readings if self.recorded else []
+        return next((used for used in fitting if used.read.name in readings), fitting[0])
 
     @property
     def searched(self) -> list[Parameter]:

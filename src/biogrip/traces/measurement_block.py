@@ -23,11 +23,7 @@ from biogrip.physics.instruments import (
 )
 from biogrip.physics.noise import Noise
 from biogrip.physics.shapes import INCOMPRESSIBLE, under_shape
-from biogrip.traces.columns import (
-    AXES,
-    shape_and_sizes,
-    trace_file_problem,
-)
+from biogrip.traces.columns import AXES, shape_and_sizes, trace_file_problem
 
 COLOURED = "coloured"
 KNOWN_NOISE = ("noise_rad", "sd", "noise_share")

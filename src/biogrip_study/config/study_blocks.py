@@ -108,23 +108,21 @@ class Identifiability(IntervalBlock):
     profiles. By default 5; with 1 a table counts them."""
 
 
-def _of_methods() -> type[Block]:
-    """Make the class of the blocks of all methods; one whose keys have defaults may be left out."""
-
-    def default(kind: Any) -> Any:
-        needed = [key for key in fields(kind) if key.default is key.default_factory is MISSING]
-        return field() if needed else field(default_factory=kind)
-
-    kinds = {method.key: method.settings for method in METHODS.values()}
-    blocks = [(name, kind, default(kind)) for name, kind in kinds.items()]
-    return make_dataclass("_MethodBlocks", blocks, bases=(Block,), frozen=True, kw_only=True)
+def _of_methods() -> Iterator[tuple[str, Any, Any]]:
+    """Yield key, kind and default of the blocks of methods; one that needs a key has no default."""
+    for method in METHODS.values():
+        kind: Any = method.settings
+        needs = any(key.default is key.default_factory is MISSING for key in fields(kind))
+        yield method.key, kind, field() if needs else field(default_factory=kind)
 
 
 if TYPE_CHECKING:
 
     class _MethodBlocks(Block): ...
 else:
-    _MethodBlocks = _of_methods()
+    _MethodBlocks = make_dataclass(
+        "_MethodBlocks", _of_methods(), bases=(Block,), frozen=True, kw_only=True
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -241,6 +239,7 @@ class CaseBlock(Shared, SampleBlocks):
 
 MOST_POINTS = 2000
 
+_Method = Annotated[str, OneOf(METHODS)]
 _Number = Annotated[float, Field(ge=-1e12, le=1e12), Tag("a number")]
 _Text = Annotated[str, Field(max_length=60), Tag("text")]
 
@@ -461,9 +460,7 @@ class StudyConfig(CasesBlocks, Shared):
     start-up."""
     pdf: bool = False
     """Whether figures are also written as PDF. Changes no result."""
-    methods: Distinct[
-        Annotated[tuple[Annotated[str, OneOf(METHODS)], ...], Field(min_length=1, max_length=100)]
-    ]
+    methods: Distinct[Annotated[tuple[_Method, ...], Field(min_length=1, max_length=100)]]
     """Identification methods applied to every trace. Tables 5-7 and figures of single fits show the
     first."""
     evaluation: Evaluation
