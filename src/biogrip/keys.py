@@ -37,8 +37,8 @@ _NAMES_LISTED = 6
 Complaint = tuple[tuple[Hashable, ...], str]
 """Path of a key, relative to its block, and a message: what was found and what is allowed."""
 
-CONFLICT, TWICE = "conflict", "twice"
-"""Names of our own pydantic errors: keys that do not go together, and a repeated item."""
+OWN = "complaint"
+"""Type of our own pydantic errors, whose messages are complete."""
 
 
 def formed(pattern: str, form: str) -> Any:
@@ -103,11 +103,11 @@ class Checked:
     @model_validator(mode="after")
     def _refuse_conflicts(self, info: ValidationInfo) -> Self:
         conflicts: list[Any] = [
-            {"type": PydanticCustomError(CONFLICT, text), "loc": path, "input": None}
+            {"type": PydanticCustomError(OWN, text), "loc": path, "input": None}
             for path, text in (self.complaints() if info.context else ())
         ]
         if conflicts:
-            raise ValidationError.from_exception_data(CONFLICT, conflicts)
+            raise ValidationError.from_exception_data(OWN, conflicts)
         return self
 
 
@@ -131,7 +131,7 @@ class OneOf:
 
 def _without_twins(items: tuple[Any, ...]) -> tuple[Any, ...]:
     if any(item in items[:index] for index, item in enumerate(items)):
-        raise PydanticCustomError(TWICE, "something is there twice")
+        raise PydanticCustomError(OWN, "holds something twice; allowed is every item once.")
     return items
 
 

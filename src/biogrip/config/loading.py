@@ -31,7 +31,7 @@ from biogrip.config.trace_blocks import IntervalBlock
 from biogrip.digits import counted
 from biogrip.errors import BiogripError, nearest, nearest_three
 from biogrip.fit.problem import GeneRange, SearchRange
-from biogrip.keys import CONFLICT, TWICE, Complaint, adapter, built, kind_of
+from biogrip.keys import OWN, Complaint, adapter, built, kind_of
 
 T = TypeVar("T")
 
@@ -101,18 +101,13 @@ def _text(path: Sequence[Hashable], leaf: "Schema", above: "Schema", error: Erro
             return f"found {_shown(found)}.{nearest(found, choices)} Allowed: {', '.join(choices)}."
         case "string_pattern_mismatch":
             return f"found {_shown(found)}, allowed is {leaf.get('form')}."
-        case _ if error["type"] == TWICE:
-            return "holds something twice; allowed is every item once."
-        case _ if error["type"] == CONFLICT:
+        case _ if error["type"] == OWN:
             return error["msg"]
         case "too_short" | "too_long" | "string_too_short" | "string_too_long":
-            few = "min_length" in error["ctx"]
-            words, limit = ("at least", "min_length") if few else ("at most", "max_length")
-            what = "character" if isinstance(found, str) else "item"
-            given = f"{_shown(found)} of {counted(len(found), what)}"
-            return f"found {given}, allowed are {words} {error['ctx'][limit]}."
-        case "finite_number":
-            return f"found {_shown(found)}, allowed is a finite number."
+            few = error["ctx"].get("min_length")
+            limit = f"at least {few}" if few else f"at most {error['ctx']['max_length']}"
+            given = counted(len(found), "character" if isinstance(found, str) else "item")
+            return f"found {_shown(found)} of {given}, allowed are {limit}."
         case "greater_than" | "greater_than_equal" | "less_than_equal":
             limits = [f"{_BOUNDS[it]} {bound(leaf.node[it])}" for it in _BOUNDS if it in leaf.node]
             return f"found {_shown(found)}, allowed is {' and '.join(limits)}."
