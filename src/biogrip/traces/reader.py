@@ -29,6 +29,7 @@ from biogrip.traces.tables import (
     number_reader,
     numbers_of,
     read_sheet,
+    seconds_or_inf,
 )
 
 FEWEST_SAMPLES = 5
@@ -495,9 +496,8 @@ def _numbers(
     decimal, unclear = decimal_mark(cells[:, indices[clock:]].ravel().tolist(), sheet.separator)
     values = np.empty((len(cells), len(indices)))
     for column, index in enumerate(indices):
-        of_column = cells[:, index].tolist()
-        number = number_reader(of_column, decimal)
-        values[:, column] = np.fromiter(map(number, of_column), float, len(cells))
+        number = seconds_or_inf if clock and column == 0 else number_reader(decimal)
+        values[:, column] = np.fromiter(map(number, cells[:, index].tolist()), float, len(cells))
         for row in np.flatnonzero(np.isinf(values[:, column]))[:1]:
             raise BiogripError(
                 f"{place(path, lines[row], table.names[index])}: found "

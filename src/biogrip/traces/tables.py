@@ -166,7 +166,9 @@ def numbers_in(sheet: Sheet, table: Table) -> dict[str, Array]:
 def numbers_of(sheet: Sheet, table: Table, index: int) -> Array:
     """Return the numbers of a column, (n_rows,), times of day in s; NaN or inf for others."""
     cells = [*map(str, sheet.cells[table.first : table.end, index])]
-    return np.array([*map(number_reader(cells, decimal_mark(cells, sheet.separator)[0]), cells)])
+    decimal, _ = decimal_mark(cells, sheet.separator)
+    number = seconds_or_inf if is_clock(cells) else number_reader(decimal)
+    return np.array([*map(number, cells)], dtype=float)
 
 
 def _cells(
@@ -539,14 +541,9 @@ def decimal_mark(cells: Sequence[str], separator: str) -> tuple[str, str]:
     return unclear or (".", "")
 
 
-def number_reader(cells: Sequence[str], decimal: str) -> Callable[[str], float]:
-    """Return what reads cells of a column, as seconds or as numbers with such a decimal mark.
-
-    It gives NaN for a gap, and inf for what it cannot read.
-    """
+def number_reader(decimal: str) -> Callable[[str], float]:
+    """Return what reads numbers with a decimal mark, and gives what `number_or_inf` does."""
     other = ".,".replace(decimal, "")
-    if is_clock(cells):
-        return seconds_or_inf
     return lambda cell: inf if other in cell else number_or_inf(cell.replace(decimal, "."))
 
 
