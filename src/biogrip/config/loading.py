@@ -54,12 +54,12 @@ def checked(kind: Callable[..., T], block: Any) -> tuple[T | None, list[Complain
         errors = error.errors(include_url=False)
     errors.sort(key=lambda error: [str(part) for part in error["loc"]])
     # A list is also called too short because its items are not valid.
-    own = [
+    explained = [
         error
         for error in errors[:_MOST]
         if error["type"] != "too_short" or len(error["input"]) < error["ctx"]["min_length"]
     ]
-    return None, [_explained(schema_of(kind), error) for error in own]
+    return None, [_explained(schema_of(kind), error) for error in explained]
 
 
 def bound(limit: float) -> str:

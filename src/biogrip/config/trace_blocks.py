@@ -43,7 +43,7 @@ _BASES = (CONTROLLED[0].column, _VOLTAGE, *(each.column for each in CONTROLLED[1
 _PULLS = _BASES[:2]
 # Share of a property; a larger change of the response would not be linear.
 _MOST_UNCERTAIN = 0.5
-_OWN = ("arm_length_m", "reference_angle_deg")
+_OF_BOTH = ("arm_length_m", "reference_angle_deg")
 
 USUAL_NAMES = BeforeValidator(
     lambda name: ALIASES.get(name.lower(), name) if isinstance(name, str) else name
@@ -76,9 +76,9 @@ class Uncertainty(Block):
     @property
     def by_part(self) -> dict[str, Mapping[str, float]]:
         """Uncertainties by part and key, as far as they are given, see `Experiment`."""
-        own = {key: known for key in _OWN if (known := getattr(self, key))}
+        both = {key: known for key in _OF_BOTH if (known := getattr(self, key))}
         torque = {"share": 0.01 * self.torque_percent} if self.torque_percent else None
-        parts = {"left": self.left, "right": self.right, "gripper": own, "torque": torque}
+        parts = {"left": self.left, "right": self.right, "gripper": both, "torque": torque}
         return {name: known for name, known in parts.items() if known}
 
 

@@ -55,7 +55,7 @@ _DATED_S = 1e10
 def form_in_words(path: Path, form: Mapping[str, Any]) -> str:
     """Return a `Recording.form` as a small table."""
     columns = form["columns"].items()
-    named = {key: f"{each['column']}, in {each['unit']}" for key, each in columns}
+    named = {key: f"{of['column']}, in {of['unit']}" for key, of in columns}
     found = {key: value for key, value in form.items() if key != "columns"} | named
     width = max(13, 2 + max(map(len, found)))
     rows = (f"\n  {key:<{width}}{visible(value)}" for key, value in found.items())
