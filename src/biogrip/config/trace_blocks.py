@@ -264,13 +264,6 @@ class SampleBlock(Checked, BaseModel):
                 yield (name,), f"is missing: {model.name} needs {', '.join(model.names)}."
 
 
-def fixed_complaints(model: SampleModel, values: Mapping[str, float]) -> Iterator[Complaint]:
-    """Find fixed parameters that the model does not have, or whose values it does not allow."""
-    yield from _parameter_complaints(model, values, "the sample")
-    if set(model.names) <= set(values):
-        yield (), "leaves nothing to identify; allowed are fewer parameters."
-
-
 def _parameter_complaints(
     model: SampleModel, values: Mapping[str, float], called: str
 ) -> Iterator[Complaint]:
@@ -369,7 +362,10 @@ class SampleBlocks(ExperimentBlocks):
 
     def complaints(self) -> Iterator[Complaint]:
         """Find known parameters, a protocol, and readings that do not fit the rest."""
-        yield from below(("fixed",), fixed_complaints(self.sample.sample.model, self.fixed))
+        model = self.sample.sample.model
+        yield from below(("fixed",), _parameter_complaints(model, self.fixed, "the sample"))
+        if {*model.names} <= self.fixed.keys():
+            yield ("fixed",), "leaves nothing to identify; allowed are fewer parameters."
         kind, used = of_kind(self.instrument), self.instrument_used
         yield from below(("protocol",), self.protocol.instrument_complaints(kind))
         for name in self.measurement.readings if self.recorded else ():
