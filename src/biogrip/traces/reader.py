@@ -130,11 +130,11 @@ class Recording:
         if self.gaps:
             rows = f"{counted(self.gaps, 'row')} of {len(self.time_s) + self.gaps}"
             said.append(f"Left out for want of a number: {rows}.")
-        form, axis = self.form, _PLURALS[self.read.axis]
+        form = self.form
         for key, text in _REMARKS.items():
             if key in form:
                 found = form[key] if isinstance(form[key], str) else counted(form[key], "reading")
-                said.append(text.format(found, axis=axis, decimal=form.get("decimal")))
+                said.append(text.format(found, axis=_PLURALS[self.read.axis], **form))
         if self.load_noise:
             said.append(
                 f"Smoothed out of {self.read.load}, since the readings do not follow it: what "
