@@ -165,12 +165,12 @@ OPTIONS = {
     "--noise nan": "--noise: measurement.noise_rad: found 'nan', allowed is a number.",
     "--noise-model coloured --noise 1e-6": "--noise: measurement.noise_rad: is that of white noise",
     "--sd sd_rad --noise 1e-6": "--noise: measurement.noise_rad: does not go with sd",
-    "--set measurement.time_unit=ns": "--set: measurement.time_unit: found 'ns'. Allowed: s, ms",
+    "--set measurement.time_unit=ns": "column 'time_s': found the unit 'ns', allowed are s, ms",
     "--fix k=0": "--fix: fixed.k: found 0, allowed is at least 1e-18 and at most 1e+12 N/m.",
     "--reading strian=x": "--reading: measurement.strian: unknown key. Did you mean 'strain'?",
     "--reading strain=x": "--hold: is missing; allowed is the stress in Pa that was held",
     "--reading strain=rotation_rad --hold 1e99": "phases[0].stress_Pa: found 1e+99, allowed is",
-    "--reading modulus=x --set measurement.reading_unit=mm": "found 'mm', allowed are Pa, kPa",
+    "--reading modulus=rotation_rad --set measurement.reading_unit=mm": "unit 'mm', allowed are Pa",
     "--time=": "--time: measurement.time: found '' of 0 characters, allowed are at least 1.",
     f"--config {'x' * 300}": "File name too long",
     "--report theirs.html": "biogrip did not write it",
@@ -240,7 +240,7 @@ def test_text_that_is_no_value_of_an_option_is_refused() -> None:
         *(("--hold", text, "allowed is a number, or one with") for text in ("nan", "much")),
         ("--hold", "-5,0%", "a decimal comma? Allowed is a point"),
         ("--set", "a.b=[1", "a.b: not usable YAML: "),
-        ("--set", "a.b=1:30", "a.b: found 1:30, which YAML reads in base 60"),
+        ("--set", "a.b=1:30", "a.b: not usable YAML: found 1:30, which YAML reads in base 60"),
     ):
         with redirect_stderr(StringIO()) as error, pytest.raises(SystemExit):
             main(["identify", "trace.csv", option, text])

@@ -190,7 +190,7 @@ def test_what_no_shape_is_told_by_is_refused(afm: Path) -> None:
             "goes with the shape of a tip, not with 'pipette 2um'",
         ),
         ("pipette 2um", "", "goes with a pressure or a displacement, not with force"),
-        ("sphere 2um", "--set measurement.load_scale=-1", "goes with load, the column that it"),
+        ("sphere 2um", "--set measurement.load_scale=-1", "goes with load; give both"),
     ):
         reading = () if "--reading" in given else ("--reading", "force=force_nN")
         held = () if "--hold" in given else ("--hold", "1 Pa" if "pipette" in shape else "1 nm")

@@ -132,8 +132,8 @@ def test_all_that_is_wrong_with_a_table_is_said_at_once(tmp_path: Path) -> None:
         "1, column 'dish': stands twice; allowed is each name once.",
         "1, column 'fit': is a column of the results; allowed is another name.",
         "1, column 'k value': is a column of the results; allowed is another name.",
-        "2, column 'measurement.skip': found 1:30, which YAML reads in base 60; allowed is a "
-        "number without colons, or text in quotes.",
+        "2, column 'measurement.skip': not usable YAML: found 1:30, which YAML reads in base 60; "
+        "allowed is a number without colons, or text in quotes.",
         "2, column 'hold': found 'soon', allowed is a number, or one with its unit",
         f"4, column 'file': found '{tmp_path}/a.csv' again, as on line 3; allowed is each trace "
         "once, or a column 'reading' that tells which, as in strain=COLUMN.",

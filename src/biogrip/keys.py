@@ -37,18 +37,21 @@ _NAMES_LISTED = 6
 Complaint = tuple[tuple[Hashable, ...], str]
 """Path of a key, relative to its block, and a message: what was found and what is allowed."""
 
-CONFLICT, TWICE = "conflict", "twice"
-"""Names of our own pydantic errors: keys that do not go together, and a repeated item."""
+OWN = "complaint"
+"""Type of our own pydantic errors, whose messages are complete."""
+
+
+def formed(pattern: str, form: str) -> Any:
+    """Return the annotation of text that a pattern describes, and its form in words."""
+    return Field(pattern=pattern, json_schema_extra={"form": form})
+
 
 Printed = Annotated[
     str,
-    Field(
-        max_length=60,
-        pattern=r"^[\w.,:;()/%'][\w .,:;()+/%'-]*$",
-        json_schema_extra={
-            "form": "text of 1 to 60 letters, digits, spaces and . , : ; ( ) + / % ' - _, not "
-            "beginning with a space, + or -"
-        },
+    formed(
+        r"^[\w.,:;()/%'][\w .,:;()+/%'-]{0,59}$",
+        "text of 1 to 60 letters, digits, spaces and . , : ; ( ) + / % ' - _, not beginning with a "
+        "space, + or -",
     ),
 ]
 """Text that is safe in tables, figures and file formats."""
@@ -100,11 +103,11 @@ class Checked:
     @model_validator(mode="after")
     def _refuse_conflicts(self, info: ValidationInfo) -> Self:
         conflicts: list[Any] = [
-            {"type": PydanticCustomError(CONFLICT, text), "loc": path, "input": None}
+            {"type": PydanticCustomError(OWN, text), "loc": path, "input": None}
             for path, text in (self.complaints() if info.context else ())
         ]
         if conflicts:
-            raise ValidationError.from_exception_data(CONFLICT, conflicts)
+            raise ValidationError.from_exception_data(OWN, conflicts)
         return self
 
 
@@ -128,7 +131,7 @@ class OneOf:
 
 def _without_twins(items: tuple[Any, ...]) -> tuple[Any, ...]:
     if any(item in items[:index] for index, item in enumerate(items)):
-        raise PydanticCustomError(TWICE, "something is there twice")
+        raise PydanticCustomError(OWN, "holds something twice; allowed is every item once.")
     return items
 
 

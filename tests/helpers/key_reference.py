@@ -13,12 +13,10 @@ from typing import Any
 import pandas as pd
 from pydantic import TypeAdapter
 
-from biogrip.config.loading import read_configs
-from biogrip.config.messages import Schema, bound, tidy
+from biogrip.config.loading import Schema, bound, read_configs, tidy
 from biogrip.keys import Checked
-from biogrip_study.config.case_blocks import OVERRIDABLE
 from biogrip_study.config.study import DEFAULTS
-from biogrip_study.config.study_blocks import StudyConfig, ValueBlock
+from biogrip_study.config.study_blocks import OVERRIDABLE, StudyConfig, ValueBlock
 
 _MOST_LISTED = 6
 _SIGNS = {"exclusiveMinimum": ">", "minimum": "≥", "maximum": "≤"}

@@ -84,7 +84,7 @@ def test_a_study_gives_the_answer_of_the_command(
 def test_a_message_names_array_and_index() -> None:
     for given, said in (
         ({"strain": np.where(SECONDS == 20, np.inf, STRAIN)}, r"strain\[4\]: found inf, allowed"),
-        ({"time_s": SECONDS[::-1]}, r"time_s\[1\]: found 592 after 596 \(\[0\]\), allowed are"),
+        ({"time_s": SECONDS[::-1]}, r"time_s\[1\]: found 592 after 596, allowed are"),
         ({"strain": -STRAIN}, r"strain\[0\] to \[148\]: found a strain that goes against the st"),
         ({"time_s": 10 * SECONDS}, r"time_s\[15\]: found 640 s, allowed is the protocol's time"),
         ({"strain": np.where(SECONDS < 584, np.nan, STRAIN)}, "the trace: found 4 rows with a nu"),

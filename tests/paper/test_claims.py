@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from biogrip.physics.models import Sample
-from biogrip_study.config.case_blocks import Published
+from biogrip_study.config.study_blocks import Published
 from biogrip_study.records.rows import write_arrays
 from tests.helpers.default import seen
 from tests.helpers.places import ROOT

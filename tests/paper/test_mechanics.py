@@ -15,8 +15,8 @@ from biogrip.files import write_rows
 from biogrip.fit.problem import GeneRange
 from biogrip.physics.gripper import torque
 from biogrip.physics.models import MODELS, Sample
-from biogrip_study.config.case_blocks import Published
 from biogrip_study.config.study import Study
+from biogrip_study.config.study_blocks import Published
 from biogrip_study.records.identifications import (
     LAST_IMPROVEMENT,
     identification_columns,

@@ -9,7 +9,7 @@ import pytest
 from mpmath import mp, mpf
 
 from biogrip.arrays import Array
-from biogrip.config.experiment_blocks import PhaseBlock, ProtocolBlock
+from biogrip.config.trace_blocks import PhaseBlock, ProtocolBlock
 from biogrip.library import set_up
 from biogrip.physics.gripper import Gripper
 from biogrip.physics.gripper import torque as of_voltage

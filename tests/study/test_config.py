@@ -12,8 +12,8 @@ from biogrip.config.source import LARGEST_BYTES, read_config, read_source
 from biogrip.errors import BiogripError
 from biogrip.physics.gripper import torque
 from biogrip.physics.noise import Noise
-from biogrip_study.config.case_blocks import OVERRIDABLE
 from biogrip_study.config.study import DEFAULTS, Study, load_given_study, load_study
+from biogrip_study.config.study_blocks import OVERRIDABLE
 from biogrip_study.methods.registry import METHODS
 from tests.helpers.key_reference import STUDY, file_schema, leaves
 from tests.helpers.places import CONFIG, ROOT

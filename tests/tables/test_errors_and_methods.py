@@ -9,7 +9,7 @@ from scipy.stats import binomtest
 
 from biogrip.files import write_object
 from biogrip.physics.models import MODELS, Sample
-from biogrip_study.config.case_blocks import Published
+from biogrip_study.config.study_blocks import Published
 from biogrip_study.methods.registry import METHODS
 from biogrip_study.records.identifications import (
     ALL,

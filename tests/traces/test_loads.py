@@ -269,8 +269,12 @@ def test_a_column_of_the_load_is_the_protocol_of_all_rows(tmp_path: Path, start_
 def test_a_load_or_rows_that_are_not_there_are_explained(tmp_path: Path) -> None:
     for key, value, said in (
         ("load", "Force", "there is no column 'Force'. The file has: Time_S, Fn in mN"),
-        ("load", "Segment", "column 'Segment': found no unit, neither stated (by --set measure"),
-        ("load_unit", "V", "measurement.load_unit: found 'V', allowed are m, cm, mm, um, nm."),
+        (
+            "load",
+            "Segment",
+            "column 'Segment': found no unit; allowed are m, cm, mm, um, nm, by --set",
+        ),
+        ("load_unit", "V", "found the unit 'V', allowed are m, cm, mm, um, nm."),
         ("rows", {"Segment": "dwel"}, "found no row with 'dwel', allowed are approach"),
         ("rows", {"Part": 2}, "there is no column 'Part'. The file has: Time_S"),
         ("fit_start", True, "measurement.fit_start: does not go with load; allowed is one of"),

@@ -188,7 +188,7 @@ def test_a_unit_is_read_off_a_name_or_a_row_of_units_or_stated(
 
 def test_a_unit_is_never_guessed() -> None:
     for column, stated, below, message in (
-        ("x_y", None, "", "found no unit, neither stated (by HOW) nor"),
+        ("x_y", None, "", "found no unit; allowed are rad, mrad, urad, deg, by HOW or at"),
         ("x_uN", None, "", "found the unit 'uN' at the end of the name; allowed"),
         ("phi (mrad) left", None, "", "found no unit"),
         ("phi (rad/s)", None, "", "found the unit 'rad/s' at the end of the name; allowed"),

@@ -40,8 +40,8 @@ from biogrip.figures.style import (
     styled,
 )
 from biogrip.keys import built
-from biogrip_study.config.case_blocks import CaseBlock
 from biogrip_study.config.study import Case, Study
+from biogrip_study.config.study_blocks import CaseBlock
 from biogrip_study.methods.genome import encodable_values
 from biogrip_study.records.identifications import (
     near_noise,

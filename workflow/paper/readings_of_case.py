@@ -17,8 +17,8 @@ from biogrip.fit.problem import Fit, TraceProblem
 from biogrip.keys import built
 from biogrip.physics.noise import add_noise, rms, stream
 from biogrip.terminal import Progress
-from biogrip_study.config.case_blocks import CaseBlock
 from biogrip_study.config.study import Case
+from biogrip_study.config.study_blocks import CaseBlock
 from biogrip_study.methods.genetic import identify_many
 from biogrip_study.records.traces import read_target
 from biogrip_study.stages.identification import seed_groups

@@ -26,11 +26,16 @@ from biogrip.arrays import Array
 from biogrip.command.options import Setting
 from biogrip.command.words import remarks_on_hold
 from biogrip.config.case import SampleCase
-from biogrip.config.experiment_blocks import LARGEST_PARAMETER, LONGEST_S, SHORTEST_S
-from biogrip.config.loading import load, read_config_of, read_configs, trace_defaults
-from biogrip.config.messages import checked, with_numbers
+from biogrip.config.loading import (
+    checked,
+    load,
+    read_config_of,
+    read_configs,
+    trace_defaults,
+    with_numbers,
+)
 from biogrip.config.source import HOLD, RAMP, KeyPath, Source, keys_in, overlaid, read_source
-from biogrip.config.trace_blocks import TraceConfig
+from biogrip.config.trace_blocks import LARGEST_PARAMETER, LONGEST_S, SHORTEST_S, TraceConfig
 from biogrip.errors import BiogripError
 from biogrip.physics.instruments import (
     DISPLACEMENT,

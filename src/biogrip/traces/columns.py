@@ -5,7 +5,7 @@ A unit is stated, stands at the end of the column's name, as in ``rotation_urad`
 """
 
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from math import pi
 from pathlib import Path
@@ -111,39 +111,28 @@ def unit_of(
     which of name, cell and statement contradict each other.
     """
     where, choices = place(path, column=column), ", ".join(allowed)
+    # Those of another quantity contradict; that of an axis may be shortened, as time_m.
+    others = () if scaled or allowed in AXES.values() else _READING_UNITS - {"1"}
     # A name may end with something other than a unit, as in rotation_left or phi (2).
-    ends = (known_unit(end, allowed) for end in _endings(column, *_SURELY, *_PERHAPS))
-    at_end, in_row = next(filter(None, ends), None), unit_in_cell(below, allowed)
-    unit = (at_end or in_row) if given is None else known_unit(given, allowed)
+    at_end = _first_unit(_endings(column, *_SURELY, *_PERHAPS), allowed, others)
+    in_row = _first_unit([_bare(below)], allowed, others)
+    usable = (unit for unit in (at_end, in_row) if unit in allowed)
+    unit = next(usable, None) if given is None else known_unit(given, allowed)
     if given is not None and unit is None:
         raise BiogripError(f"{where}: found the unit '{given}', allowed are {choices}.")
-    end = _said_at_end(column) or ""
-    # That of an axis may be shortened, as time_m.
-    known = _READING_UNITS - {"1"} if allowed not in AXES.values() else ()
-    kind = known_unit(end or _bare(below), known)
-    in_row = in_row or (known_unit(_bare(below), _READING_UNITS) if given and not scaled else None)
-    at_end = at_end or (kind if end and given and not scaled else None)
     of_frequency = unit == "1/s" and "Hz" in allowed
     if of_frequency and not _ANGULAR.search(plain_name(column)):
         raise BiogripError(f"{where}: found the unit 1/s; allowed are rad/s or Hz, by {said_by}.")
     if unit is None and "1" in allowed and _bare(below) in ("", "-") and _is_pure(column):
         return "1"
     if unit is None:
+        end = _said_at_end(column)
         found = f"the unit '{shortened(end)}' at the end of the name" if end else "no unit"
         row = f" (but '{shortened(below)}' below it)" if below else ""
-        how = f", or state one by {said_by}" if end and not kind else ""
-        row += f", neither stated (by {said_by}) nor at the end of the name" * (not (end or kind))
-        of_moduli = not end and allowed == MODULUS.units
-        hint = " What is over another modulus, as G/G0, is a relative_modulus." * of_moduli
-        if allowed == ROTATION.units:
-            names = (name for name in INSTRUMENTS if name in plain_name(column).lower())
-            example = f"{next(names, STRAIN.name)}={column}"
-            hint = f" Which quantity is it? Say so, as by --reading {quote(example)}."
-        elif allowed == STRAIN.units and kind in DISPLACEMENT.units:
-            hint = _TO_STRAIN
-        elif allowed.keys() == FORCE.units.keys() and kind in STRESS.units:
-            hint = _SUCKS
-        raise BiogripError(f"{where}: found {found}{row}; allowed are {choices}{how}.{hint}")
+        raise BiogripError(
+            f"{where}: found {found}{row}; allowed are {choices}, by {said_by} or at the end of "
+            f"the name.{_hint(column, allowed, at_end or in_row or '')}"
+        )
     for other, said in ((at_end, "the name"), (in_row, "the row of units")):
         if other not in (None, unit):
             raise BiogripError(
@@ -151,6 +140,24 @@ def unit_of(
                 "is one unit."
             )
     return "rad/s" if of_frequency else unit
+
+
+def _first_unit(written: Sequence[str], *kinds: Collection[str]) -> str | None:
+    units = (known_unit(text, kind) for kind in kinds for text in written)
+    return next(filter(None, units), None)
+
+
+def _hint(column: str, allowed: Mapping[str, float], kind: str) -> str:
+    """Return what helps a column without an allowed unit, but with one of another kind."""
+    if allowed == MODULUS.units and not kind:
+        return " What is over another modulus, as G/G0, is a relative_modulus."
+    if allowed == ROTATION.units:
+        names = (name for name in INSTRUMENTS if name in plain_name(column).lower())
+        example = f"{next(names, STRAIN.name)}={column}"
+        return f" Which quantity is it? Say so, as by --reading {quote(example)}."
+    if allowed == STRAIN.units and kind in DISPLACEMENT.units:
+        return _TO_STRAIN
+    return _SUCKS if allowed == FORCE.units and kind in STRESS.units else ""
 
 
 def unit_in_cell(cell: str, allowed: Collection[str]) -> str | None:
@@ -296,15 +303,13 @@ def listed(names: list[str], most: int = _MOST_LISTED) -> str:
 
 def trace_file_problem(path: str | Path) -> str | None:
     """Return what is wrong with the path of a trace, or None if it is a file."""
-    file, shown = Path(path), visible(path)
-    shown = shown if len(shown) <= _LONGEST_PATH else f"{shown[:_LONGEST_PATH]}..."
+    file, shown = Path(path), f"{visible(path):.{_LONGEST_PATH}}"
     folder = "" if file.is_absolute() else f" in {visible(file.parent.absolute())}"
-    found = f"there is no file {shown}{folder[:_LONGEST_PATH]}."
+    found = f"there is no file {shown}{folder:.{_LONGEST_PATH}}."
     try:
-        if file.is_file():
-            return None
         if file.exists():
-            return f"found '{shown}', which is no regular file; allowed is one."
+            regular = f"found '{shown}', which is no regular file; allowed is one."
+            return None if file.is_file() else regular
         beside = [str(other) for other in file.parent.glob("*") if other.is_file()]
     except (OSError, ValueError):
         # A name that is too long or invalid for the system: no neighbours to suggest.

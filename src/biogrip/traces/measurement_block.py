@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
-from pydantic import BeforeValidator, Field, Tag
+from pydantic import Field, Tag
 
 from biogrip.keys import BY_KIND, Block, Complaint, Distinct, OneOf
 from biogrip.physics.instruments import (
@@ -23,13 +23,7 @@ from biogrip.physics.instruments import (
 )
 from biogrip.physics.noise import Noise
 from biogrip.physics.shapes import INCOMPRESSIBLE, under_shape
-from biogrip.traces.columns import (
-    AXES,
-    TIME_UNITS,
-    known_unit,
-    shape_and_sizes,
-    trace_file_problem,
-)
+from biogrip.traces.columns import AXES, shape_and_sizes, trace_file_problem
 
 COLOURED = "coloured"
 KNOWN_NOISE = ("noise_rad", "sd", "noise_share")
@@ -41,34 +35,22 @@ ARRAYS = "<arrays>"
 READINGS = tuple(INSTRUMENTS)
 """Keys that name the column of the readings, one for each quantity that an instrument reads."""
 
-_FREQUENCIES = AXES["frequency"]
-_SWEPT = tuple(name for name, instrument in INSTRUMENTS.items() if instrument.sweeps)
+_OF_TIMES = {"start_s", "load", "fit_start", "offset", "drift"}
 _OF_SWEEPS = ("frequency", "frequency_unit", *PARTNERS, "partner_unit", "loss_sd", "phase_sd_rad")
 # Keys of simulated traces, too; the others are of a file.
 _OF_ALL = {"rate_Hz", "file", "noise", "noise_model", "offset", "drift"}
-# Keys that no option of the command sets but `--set`, with what they may say.
-_BY_SET = {
-    "time_unit": "UNIT",
-    "frequency_unit": "UNIT",
-    "partner_unit": "UNIT",
-    "loss_sd": "COLUMN",
-    "rotation_unit": "UNIT",
-    "reading_unit": "UNIT",
-    "load_unit": "UNIT",
-    "load_scale": "-1",
-    "average_repeated": "true",
-    "scale": "-1",
-}
-
-
-def _unit(allowed: Mapping[str, float]) -> BeforeValidator:
-    """Return what makes a unit, as µs, the allowed one that it is."""
-    return BeforeValidator(
-        lambda it: (known_unit(it, allowed) if isinstance(it, str) else it) or it
-    )
-
+# What keys that no option of the command sets but `--set` may say, beside units.
+_BY_SET = {"loss_sd": "COLUMN", "load_scale": "-1", "scale": "-1", "average_repeated": "true"}
+# Keys that go with another one, and pairs of keys that do not.
+_GOES_WITH = {"load_scale": "load", "poisson": "shape", "phase_sd_rad": "noise_share"}
+_EITHER = (
+    *(("fit_start", "start_s"), ("fit_start", "load"), ("noise_rad", "sd"), ("noise_share", "sd")),
+    *(("rotation_unit", key) for key in READINGS if key != ROTATION.name),
+    ("reading_unit", ROTATION.name),
+)
 
 _Name = Annotated[str | None, Field(min_length=1, max_length=4000)]
+_Unit = Annotated[str | None, Field(min_length=1, max_length=20)]
 
 _BlockNumber = Annotated[int, Field(ge=1, le=1_000_000)]
 _Blocks = Annotated[
@@ -127,18 +109,18 @@ class MeasurementBlock(Block):
     """Name of the column of phases between strain and stress."""
     loss_factor: _Name = None
     """Name of the column of loss factors, loss over storage modulus (tan delta)."""
-    frequency_unit: Annotated[str | None, OneOf(_FREQUENCIES), _unit(_FREQUENCIES)] = None
-    """Unit of the frequencies, where the column's name does not end in it."""
-    partner_unit: Annotated[str | None, Field(min_length=1, max_length=20)] = None
+    frequency_unit: _Unit = None
+    """Unit of the frequencies, rad/s, Hz, mHz or kHz, where the name does not end in it."""
+    partner_unit: _Unit = None
     """Unit of loss moduli or phases, where the column's name does not end in it; of loss moduli by
     default that of the storage moduli."""
     loss_sd: _Name = None
     """Name of the column of the loss moduli's standard deviations; `sd` has those of the others."""
-    time_unit: Annotated[str | None, OneOf(TIME_UNITS), _unit(TIME_UNITS)] = None
-    """Unit of the times, where the column's name does not end in it."""
-    rotation_unit: Annotated[str | None, OneOf(ROTATION.units), _unit(ROTATION.units)] = None
-    """Unit of the rotations, where the column's name does not end in it."""
-    reading_unit: Annotated[str | None, Field(min_length=1, max_length=20)] = None
+    time_unit: _Unit = None
+    """Unit of the times, s, ms, us, min, h or d, where the column's name does not end in it."""
+    rotation_unit: _Unit = None
+    """Unit of the rotations, rad, mrad, urad or deg, where the column's name does not end in it."""
+    reading_unit: _Unit = None
     """Unit of what another instrument reads, where the column's name does not end in it; of strains
     by default 1."""
     block: _Blocks | None = None
@@ -153,7 +135,7 @@ class MeasurementBlock(Block):
     displacements or strains under which the readings were taken. The protocol follows it from row
     to row, from start_s on; without that from its first row or, if there it is not zero, from 0.
     Only for `biogrip identify`."""
-    load_unit: Annotated[str | None, Field(min_length=1, max_length=20)] = None
+    load_unit: _Unit = None
     """Unit of the column `load`, where its name does not end in it."""
     load_scale: Annotated[float | None, Field(ge=-1e30, le=1e30)] = None
     """Load, in its unit, over the number in its column, as `scale` is of the readings: -1 for a
@@ -302,40 +284,38 @@ class MeasurementBlock(Block):
 
     def complaints(self) -> Iterator[Complaint]:
         """Find keys that are in conflict, and what a recorded trace lacks."""
-        for key in (key for key in KNOWN_NOISE if getattr(self, key) is not None):
-            if self.coloured:
-                yield (key,), "is that of white noise; leave it out where noise_model is coloured."
-            if self.sd is not None and key != "sd":
-                yield (key,), "does not go with sd, which says all of the noise."
+        given = {key: value for key, value in vars(self).items() if value not in (None, False)}
+        for key in (key for key in KNOWN_NOISE if key in given and self.coloured):
+            yield (key,), "is that of white noise; leave it out where noise_model is coloured."
+        for key, other in _EITHER:
+            if key in given and other in given:
+                yield (key,), f"does not go with {other}; allowed is one of them."
+        for key, other in _GOES_WITH.items():
+            if key in given and other not in given:
+                yield (key,), f"goes with {other}; give both, or leave it out."
         for key in ("scale", "load_scale"):
-            if getattr(self, key) == 0:
+            if given.get(key) == 0:
                 yield (key,), "found 0, allowed is another number."
-        if self.load_scale is not None and self.load is None:
-            yield ("load_scale",), "goes with load, the column that it scales."
-        for other in ("start_s", "load"):
-            if self.fit_start and getattr(self, other) is not None:
-                yield ("fit_start",), f"does not go with {other}; allowed is one of them."
         if self.file is None:
-            for key, given in vars(self).items():
-                if key not in _OF_ALL and given not in (None, False):
-                    yield (key,), "is only for a recorded trace, whose measurement has a file."
+            for key in (key for key in given if key not in _OF_ALL):
+                yield (key,), "is only for a recorded trace, whose measurement has a file."
             return
-        yield from self._axis_complaints()
+        yield from self._axis_complaints({*given})
         yield from self._reading_complaints()
         if self.file != ARRAYS and (complaint := trace_file_problem(self.file)):
             yield ("file",), complaint
 
-    def _axis_complaints(self) -> Iterator[Complaint]:
+    def _axis_complaints(self, given: set[str]) -> Iterator[Complaint]:
         """Find what a sweep or a trace in time lacks, and what only the other one has."""
-        given = {key for key, value in vars(self).items() if value not in (None, False)}
-        if not any(INSTRUMENTS[name].sweeps for name in self.readings):
-            if self.time is None:
-                yield ("time",), "is missing: a recorded trace needs the name of its time column."
-            for key in sorted(given & {*_OF_SWEEPS}):
-                yield (key,), f"is of a frequency sweep, which reads {' or '.join(_SWEPT)}."
+        sweeps = any(INSTRUMENTS[name].sweeps for name in self.readings)
+        axis = "frequency" if sweeps else "time"
+        if axis not in given:
+            yield (axis,), f"is missing: a recorded trace needs the name of its {axis} column."
+        for key in sorted(given & {*(_OF_TIMES if sweeps else _OF_SWEEPS)}):
+            kind = "a trace in time, and this is a frequency sweep" if sweeps else "a sweep"
+            yield (key,), f"is of {kind}; leave it out."
+        if not sweeps:
             return
-        if self.frequency is None:
-            yield ("frequency",), "is missing: a sweep needs the name of its frequency column."
         if len(partners := given & {*PARTNERS}) != 1:
             found = " and ".join(sorted(partners)) or "none"
             text = f"goes with one of {', '.join(PARTNERS)}; found {found}"
@@ -343,12 +323,8 @@ class MeasurementBlock(Block):
         alone = len(given & {"sd", "loss_sd"}) == 1 or ("sd" in given and "loss" not in given)
         if alone or {"sd", "complex_viscosity"} <= given:
             yield ("sd",), "of a sweep goes with loss and loss_sd: both moduli need deviations."
-        for key in sorted(given & {"start_s", "load", "fit_start", "offset", "drift"}):
-            yield (key,), "is of a trace in time, and this is a frequency sweep; leave it out."
         if self.coloured:
             yield ("noise_model",), "found coloured, allowed with a frequency sweep is white."
-        if self.phase_sd_rad is not None and self.noise_share is None:
-            yield ("phase_sd_rad",), "goes with noise_share, that of the amplitudes."
 
     def _reading_complaints(self) -> Iterator[Complaint]:
         if not self.readings:
@@ -358,28 +334,15 @@ class MeasurementBlock(Block):
         name, *others = self.readings
         for other in others:
             yield (other,), f"does not go with {name}; allowed is one of {', '.join(READINGS)}."
-        right, wrong = "rotation_unit", "reading_unit"
-        if name != ROTATION.name:
-            right, wrong = wrong, right
-        if getattr(self, wrong) is not None:
-            yield (wrong,), f"does not go with {name}; allowed is {right}."
         if complaints := [*self._shape_complaints(name)]:
             yield from complaints
-            return
-        if self.fit_contact and self.tip_power is None:
+        elif self.fit_contact and self.tip_power is None:
             text = "takes the shape of a tip, and a recorded depth (--load)"
             yield ("fit_contact",), f"{text}: of a dwell alone nothing tells it."
-        instrument = self.instrument
-        for key, of in (("reading_unit", instrument.read), ("load_unit", instrument.controlled)):
-            unit = getattr(self, key)
-            if unit is not None and known_unit(unit, of.units) is None:
-                yield (key,), f"found '{unit}', allowed are {', '.join(of.units)}."
 
     def _shape_complaints(self, name: str) -> Iterator[Complaint]:
         """Find what is wrong with a shape, where a quantity is read."""
         if self.shape is None:
-            if self.poisson is not None:
-                yield ("poisson",), "goes with the shape of a tip."
             return
         try:
             shape, _ = shape_and_sizes(self.shape)
@@ -398,8 +361,8 @@ UNREAD = MeasurementBlock(rate_Hz=1.0, noise=Noise("gaussian", 0.0, "peak"))
 
 
 def _option(key: str) -> str:
-    if key in _BY_SET:
-        return f"--set measurement.{key}={_BY_SET[key]}"
+    if key.endswith("_unit") or key in _BY_SET:
+        return f"--set measurement.{key}={_BY_SET.get(key, 'UNIT')}"
     if key in PARTNERS:
         return f"--reading {key}=COLUMN"
     return "--reading" if key in INSTRUMENTS else f"--{key}"

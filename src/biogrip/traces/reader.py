@@ -29,6 +29,7 @@ from biogrip.traces.tables import (
     number_reader,
     numbers_of,
     read_sheet,
+    seconds_or_inf,
 )
 
 FEWEST_SAMPLES = 5
@@ -37,6 +38,16 @@ _PLURALS = {"time": "times", "frequency": "frequencies"}
 _SHORTEST_STEP = 1e-18
 _IN_WORDS = {",": "commas", ";": "semicolons", "\t": "tabs", BLANKS: "blanks"}
 _DECIMAL = {".": "point", ",": "comma"}
+# What `Recording.remarks` says of parts of its form.
+_REMARKS = {
+    "averaged": "Averaged at repeated {axis}: {}.",
+    "outside": "Left out by from_s and until_s: {}.",
+    "others": "Left out, for rows asks for others: {}.",
+    "unclear": "The {decimal} of {} is read as a decimal mark; where it is between thousands, "
+    "numbers are 1000 times as large.",
+    "below": "Left out below the last row, where it may be cut: {}.",
+    "lacks": "The last row has {}, as where a file was cut.",
+}
 # More seconds than there are in hours, minutes and seconds without a date.
 _DATED_S = 1e10
 
@@ -44,7 +55,7 @@ _DATED_S = 1e10
 def form_in_words(path: Path, form: Mapping[str, Any]) -> str:
     """Return a `Recording.form` as a small table."""
     columns = form["columns"].items()
-    named = {key: f"{each['column']}, in {each['unit']}" for key, each in columns}
+    named = {key: f"{of['column']}, in {of['unit']}" for key, of in columns}
     found = {key: value for key, value in form.items() if key != "columns"} | named
     width = max(13, 2 + max(map(len, found)))
     rows = (f"\n  {key:<{width}}{visible(value)}" for key, value in found.items())
@@ -120,26 +131,15 @@ class Recording:
             rows = f"{counted(self.gaps, 'row')} of {len(self.time_s) + self.gaps}"
             said.append(f"Left out for want of a number: {rows}.")
         form = self.form
-        counts = {
-            "averaged": f"Averaged at repeated {_PLURALS[self.read.axis]}",
-            "outside": "Left out by from_s and until_s",
-            "others": "Left out, for rows asks for others",
-        }
-        said += [f"{counts[key]}: {counted(form[key], 'row')}." for key in counts if form.get(key)]
+        for key, text in _REMARKS.items():
+            if form.get(key):
+                found = form[key] if isinstance(form[key], str) else counted(form[key], "row")
+                said.append(text.format(found, axis=_PLURALS[self.read.axis], **form))
         if self.load_noise:
             said.append(
                 f"Smoothed out of {self.read.load}, since the readings do not follow it: what "
                 f"scatters from row to row by {plain(100 * self.load_noise, 2)} % of the largest."
             )
-        if "unclear" in form:
-            said.append(
-                f"The {form['decimal']} of {form['unclear']} is read as a decimal mark; where it "
-                "is between thousands, numbers are 1000 times as large."
-            )
-        if "below" in form:
-            said.append(f"Left out below the last row, where it may be cut: {form['below']}.")
-        if "lacks" in form:
-            said.append(f"The last row has {form['lacks']}, as where a file was cut.")
         if "clock" in form:
             begins = ", when the protocol is taken to start" * form["clock"].startswith("dates")
             said.append(f"Times are {form['clock']}{begins * (self.onset_s is None)}.")
@@ -155,15 +155,15 @@ class Recording:
 
 def is_usual(recording: Recording) -> bool:
     """Return True of arrays, and of a file with a table as biogrip itself would write."""
-    form, columns = recording.form, recording.read
-    odd = ("units_line", "block", "preamble", "averaged", "outside", "others", "unclear", "clock")
+    form, named = recording.form, recording.read.named
+    usual = {"encoding": "UTF-8", "separator": "commas", "decimal": "point"}
+    odd = {"units_line", "block", "preamble", "averaged", "outside", "others", "unclear", "clock"}
+    names = ["time_s", recording.read.instrument.read.column]
     return recording.path is None or (
-        (form["encoding"], form["separator"], form["decimal"]) == ("UTF-8", "commas", "point")
-        and not any(key in form for key in odd)
-        and columns.block is None
-        and columns.load is None
-        and (columns.axis_column, columns.reading_column)
-        == ("time_s", columns.instrument.read.column)
+        usual.items() <= form.items()
+        and not odd & form.keys()
+        and "load" not in named
+        and [*named.values()][:2] == names
     )
 
 
@@ -345,7 +345,6 @@ def _checked(
     """
     gaps = np.any(np.isnan(values), axis=1)
     values, lines, without_number = values[~gaps], lines[~gaps], int(np.count_nonzero(gaps))
-    _check_count(path, columns, len(values), without_number)
     for index, (key, column) in enumerate(columns.named.items()):
         for row in np.flatnonzero(values[:, index] <= 0)[:1] if key in ("sd", "loss_sd") else ():
             raise BiogripError(
@@ -355,25 +354,22 @@ def _checked(
     if columns.partner:
         ascending = np.argsort(values[:, 0], kind="stable")
         values, lines = values[ascending], lines[ascending]
-    averaged = 0
+    in_si = AXES[columns.axis][units[0]]
+    clock = values[:, 0] * (1.0 if columns.partner else in_si)
+    used = clock >= (-np.inf if columns.from_s is None else columns.from_s)
+    used &= clock <= (np.inf if columns.until_s is None else columns.until_s)
+    values, lines, averaged = values[used], lines[used], 0
+    _check_count(path, columns, len(values), without_number)
     if columns.average_repeated:
         values, lines, averaged = _averaged(values, lines, 3 if columns.partner else 2)
     _check_order(path, columns, values[:, 0], lines)
-    time_s = values[:, 0] * AXES[columns.axis][units[0]]
-    used, clock = np.ones(len(time_s), bool), values[:, 0] if columns.partner else time_s
-    if columns.from_s is not None:
-        used &= clock >= columns.from_s
-    if columns.until_s is not None:
-        used &= clock <= columns.until_s
-    values, lines, time_s = values[used], lines[used], time_s[used]
-    _check_count(path, columns, len(values), without_number, f"usable {columns.axis}")
+    time_s = values[:, 0] * in_si
     quantity, scale = columns.instrument.read, columns.scale or 1.0
     end = "rad_per_s" if columns.partner else "s"
     form = {
         "gaps": without_number,
         "averaged": averaged or None,
         "outside": int(np.count_nonzero(~used)) or None,
-        "others": None,
         f"first_{end}": float(time_s[0]),
         f"last_{end}": float(time_s[-1]),
     }
@@ -386,17 +382,9 @@ def _checked(
         sd = None if sd is None else joined(time_s, *(abs(unit) * values[:, 3:].T))[1]
         time_s, readings = joined(time_s, *moduli)
         lines = np.append(lines[::-1], lines)
-    return Recording(
-        time_s,
-        readings,
-        lines,
-        path,
-        columns,
-        (units[0], units[1]),
-        sd=sd,
-        gaps=without_number,
-        form=form,
-    )
+    form = {key: value for key, value in form.items() if value is not None}
+    of_file = path, columns, (units[0], units[1])
+    return Recording(time_s, readings, lines, *of_file, sd=sd, gaps=without_number, form=form)
 
 
 def _no_column(
@@ -508,9 +496,8 @@ def _numbers(
     decimal, unclear = decimal_mark(cells[:, indices[clock:]].ravel().tolist(), sheet.separator)
     values = np.empty((len(cells), len(indices)))
     for column, index in enumerate(indices):
-        of_column = cells[:, index].tolist()
-        number = number_reader(of_column, decimal)
-        values[:, column] = np.fromiter(map(number, of_column), float, len(cells))
+        number = seconds_or_inf if clock and column == 0 else number_reader(decimal)
+        values[:, column] = np.fromiter(map(number, cells[:, index].tolist()), float, len(cells))
         for row in np.flatnonzero(np.isinf(values[:, column]))[:1]:
             raise BiogripError(
                 f"{place(path, lines[row], table.names[index])}: found "
@@ -551,18 +538,16 @@ def _chosen(path: Path, sheet: Sheet, table: Table, columns: MeasurementBlock) -
     # Imported here, as below: most traces are of one condition.
     from biogrip.traces.conditions import is_like
 
+    line = int(sheet.numbers[table.at]) or None
     for column, wanted in columns.rows.items():
-        line = int(sheet.numbers[table.at]) or None
-        where = place(path, line, column)
         if not (same := table.indices(column)):
             raise BiogripError(_no_column(path, line, column, table.names))
         cells = [str(cell) for cell in sheet.cells[table.first : table.end, same[0]]]
         values = [*dict.fromkeys(cells)]
         fits = {cell for cell in values if is_like(cell, wanted)}
         if not fits:
-            shown = f"{wanted:g}" if isinstance(wanted, float) else wanted
-            text = f"found no row with '{shown}', allowed are {listed(values, 10)}."
-            raise BiogripError(f"{where}: {text}{nearest(wanted, values)}")
+            text = f"found no row with '{wanted}', allowed are {listed(values, 10)}."
+            raise BiogripError(f"{place(path, line, column)}: {text}{nearest(wanted, values)}")
         chosen &= [cell in fits for cell in cells]
     return chosen
 
@@ -591,20 +576,20 @@ def _check_conditions(
     rows = sheet.cells[np.searchsorted(sheet.numbers, lines)]
     others = {n: rows[:, i].tolist() for i, n in enumerate(table.names) if n and i not in read}
     condition = tells_apart(places, others)
-    said = f"{place(path)}: found {_PLURALS[columns.axis]} again and again"
     if condition:
         there = (f"'{name}' ({listed(values, 5)})" for name, values in condition.items())
+        said = f"in rows that {' and '.join(there)} tells apart"
         ways = (f"--rows {quote(f'{name}={values[0]}')}" for name, values in condition.items())
-        raise BiogripError(
-            f"{said}, in rows that {' and '.join(there)} tells apart; allowed are rows of one "
-            f"condition, as by {' '.join(ways)}."
-        )
-    if sweeps and not columns.average_repeated:
-        raise BiogripError(
-            f"{said}, with moduli that differ by more than noise, as of several conditions; "
-            "allowed are rows of one, in a file of their own or with a column that tells them "
-            "apart."
-        )
+        way = f"as by {' '.join(ways)}"
+    elif sweeps and not columns.average_repeated:
+        said = "with moduli that differ by more than noise, as of several conditions"
+        way = "in a file of their own or with a column that tells them apart"
+    else:
+        return
+    raise BiogripError(
+        f"{place(path)}: found {_PLURALS[columns.axis]} again and again, {said}; allowed are rows "
+        f"of one condition, {way}."
+    )
 
 
 def _load(
@@ -642,7 +627,7 @@ def _averaged(values: Array, lines: IntArray, first_sd: int = 2) -> tuple[Array,
 
 
 def _check_count(
-    path: Path | None, columns: MeasurementBlock, found: int, without_number: int, what: str = "row"
+    path: Path | None, columns: MeasurementBlock, found: int, without_number: int
 ) -> None:
     # Each row of a sweep has two readings.
     fewest = FEWEST_SAMPLES // (2 if columns.partner else 1)
@@ -651,7 +636,7 @@ def _check_count(
         *names, last = columns.named.values()
         which = f"{'both ' if len(names) == 1 else ''}{', '.join(names)} and {last}"
         raise BiogripError(
-            f"{place(path)}: found {counted(found, what)} with a number in {which}{gaps}, "
+            f"{place(path)}: found {counted(found, 'row')} with a number in {which}{gaps}, "
             f"allowed are at least {fewest}."
         )
 
@@ -662,14 +647,11 @@ def _check_order(
     least = _SHORTEST_STEP * float(np.max(np.abs(time)))
     for row in np.flatnonzero(np.diff(time) <= least)[:1]:
         before, now = time[row : row + 2]
-        found, hint = f"{now:.15g} after {before:.15g}", ""
-        earlier = f"line {lines[row]}" if path else f"[{lines[row]}]"
+        axes, hint = _PLURALS[columns.axis], ""
         if now == before:
-            found = f"{now:.15g} repeated"
             way = columns.said_by("average_repeated")
-            hint = f" The readings of equal {_PLURALS[columns.axis]} are averaged by {way}."
-        by = f", by more than {least:.1g}" if now > before else ""
+            hint = f" The readings of equal {axes} are averaged by {way}."
         raise BiogripError(
-            f"{place(path, lines[row + 1], columns.axis_column)}: found {found} "
-            f"({earlier}), allowed are {_PLURALS[columns.axis]} that increase{by}.{hint}"
+            f"{place(path, lines[row + 1], columns.axis_column)}: found {now:.15g} after "
+            f"{before:.15g}, allowed are {axes} that increase.{hint}"
         )

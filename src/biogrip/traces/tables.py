@@ -133,8 +133,8 @@ def read_sheet(path: Path, columns: MeasurementBlock) -> Sheet:
     separator, numbered = _with_names(lines, {*map(plain_name, columns.named.values())})
     if not numbered:
         raise BiogripError(f"{place(path)}: found no header, allowed is a line with column names.")
-    kept, numbers = [line for line, _ in numbered], np.array([number for _, number in numbered])
-    headers = [i for i, it in enumerate(kept) if i == 0 or numbers[i] == 0 or not _ROW.match(it)]
+    kept, numbers = [*numbered.values()], np.array([*numbered])
+    headers = [at for at, text in enumerate(kept) if not (at and numbers[at] and _ROW.match(text))]
     cells, widths = _cells(path, kept, numbers, "\t" if separator == BLANKS else separator)
     without_end = len(lines) if lines[-1].strip() else 0
     return Sheet(encoding, separator, cells, widths, numbers, headers, without_end)
@@ -166,7 +166,9 @@ def numbers_in(sheet: Sheet, table: Table) -> dict[str, Array]:
 def numbers_of(sheet: Sheet, table: Table, index: int) -> Array:
     """Return the numbers of a column, (n_rows,), times of day in s; NaN or inf for others."""
     cells = [*map(str, sheet.cells[table.first : table.end, index])]
-    return np.array([*map(number_reader(cells, decimal_mark(cells, sheet.separator)[0]), cells)])
+    decimal, _ = decimal_mark(cells, sheet.separator)
+    number = seconds_or_inf if is_clock(cells) else number_reader(decimal)
+    return np.array([*map(number, cells)], dtype=float)
 
 
 def _cells(
@@ -237,57 +239,60 @@ def _read_text(path: Path) -> tuple[str, str]:
     )
 
 
-def _with_names(lines: Sequence[str], wanted: set[str]) -> tuple[str, list[tuple[str, int]]]:
-    """Return the separator, and lines with numbers from 1, without comments and empty ones.
+def _with_names(lines: Sequence[str], wanted: set[str]) -> tuple[str, dict[int, str]]:
+    """Return the separator, and lines by number, from 1, without comments and empty ones.
 
     Where no other line has the wanted names, comments may have them, or they are numbers of
-    columns, which then stand above the first row. Blanks between cells become tabs.
+    columns, which then stand above the first row as line 0. Blanks between cells become tabs.
     """
-    every = [(line, number) for number, line in enumerate(lines, 1)]
-    kept = [own for own in every if not _LEFT_OUT.match(own[0])]
-    words = [line for line, _ in kept if not _ROW.match(line)]
-    separator, common = _separator(kept, words, wanted)
-    first = next((own for own in kept if _ROW.match(own[0] + " ")), None)
+    every = dict(enumerate(lines, 1))
+    kept = {number: text for number, text in every.items() if not _LEFT_OUT.match(text)}
+    words = [text for text in kept.values() if not _ROW.match(text)]
+    separator, common = _separator([*kept.values()], words, wanted)
+    first = next((number for number, text in kept.items() if _ROW.match(text + " ")), 0)
     if first and common < len(wanted):
-        kept = [own for own in kept if not _COMMENT.match(own[0])]
+        kept = {number: text for number, text in kept.items() if not _COMMENT.match(text)}
         if all(map(str.isdecimal, wanted)):
-            names = range(1, len(_split(first[0], separator)) + 1)
-            kept.insert(kept.index(first), (separator.join(map(str, names)), 0))
+            names = map(str, range(1, len(_cells_of(kept[first], separator)) + 1))
+            above = {number: text for number, text in kept.items() if number < first}
+            kept = above | {0: separator.join(names)} | kept
         else:
-            comments = [_said(line, bare=True) for line in lines if _COMMENT.match(line)]
-            separator, _ = _separator(kept, [*words, *comments], wanted)
-            kept = _with_comments(every, first[1], separator, wanted)
+            comments = [_said(text, bare=True) for text in lines if _COMMENT.match(text)]
+            separator, _ = _separator([*kept.values()], [*words, *comments], wanted)
+            kept = _with_comments(every, first, separator, wanted)
     if separator == BLANKS:
         width = _width(kept, separator)
-        kept = [("\t".join(_cells_of(line, separator, width)), number) for line, number in kept]
+        kept = {n: "\t".join(_cells_of(text, separator, width)) for n, text in kept.items()}
     return separator, kept
 
 
 def _with_comments(
-    every: Sequence[tuple[str, int]], first: int, separator: str, wanted: set[str]
-) -> list[tuple[str, int]]:
+    every: Mapping[int, str], first: int, separator: str, wanted: set[str]
+) -> dict[int, str]:
     """Return lines that are no comments, and comments of a header, which may follow ``key: value``.
 
     These have the wanted names, or stand beside such or above the first row, with as many words.
     """
-    kept, width = list[tuple[str, int]](), _width(every, separator)
+    kept, width = dict[int, str](), _width(every, separator)
     for in_comments, group in groupby(
-        every, lambda own: not own[0].strip() or _COMMENT.match(own[0]) is not None
+        every.items(), lambda line: not line[1].strip() or _COMMENT.match(line[1]) is not None
     ):
-        block, header = [*group], list[tuple[str, int]]()
+        block, header = dict(group), dict[int, str]()
         if not in_comments:
-            kept += block
+            kept |= block
             continue
-        is_named = block[0][1] < first
-        for line, number in block:
-            cells = _cells_of(text := _said(line, bare=True), separator, width)
+        is_named = min(block) < first
+        for number, text in block.items():
+            cells = _cells_of(bare := _said(text, bare=True), separator, width)
             has_names = wanted <= _names(cells)
             is_named |= has_names
             if has_names or (len(cells) == width > 1 and not any(map(_NUMERIC.fullmatch, cells))):
-                header.append((text, number))
+                header[number] = bare
         if header and is_named:
-            said = [(_said(line), number) for line, number in block if number < header[0][1]]
-            kept += [*(own for own in said if ":" in own[0]), *header]
+            above = (
+                (number, _said(text)) for number, text in block.items() if number < min(header)
+            )
+            kept |= {number: text for number, text in above if ":" in text} | header
     return kept
 
 
@@ -297,22 +302,18 @@ def _said(line: str, *, bare: bool = False) -> str:
     return _PREFIX.sub("", text) if bare else text
 
 
-def _width(lines: Sequence[tuple[str, int]], separator: str) -> int:
+def _width(lines: Mapping[int, str], separator: str) -> int:
     """Return the number of cells in the last row of numbers."""
-    rows = (line for line, _ in reversed(lines) if _ROW.match(line + " "))
-    return len(_split(next(rows, ""), separator))
+    rows = (text for text in reversed([*lines.values()]) if _ROW.match(text + " "))
+    return len(_cells_of(next(rows, ""), separator))
 
 
-def _split(line: str, separator: str) -> list[str]:
-    if separator != BLANKS:
-        return line.split(separator)
-    return [line] if _OTHERWISE.search(line) else _CELL.findall(line)
-
-
-def _cells_of(line: str, separator: str, width: int) -> list[str]:
+def _cells_of(line: str, separator: str, width: int = 0) -> list[str]:
     """Return the cells of a line; words with single blanks are one if there are then as many."""
     if separator != BLANKS:
         return line.split(separator)
+    if _OTHERWISE.search(line):
+        return [line]
     wide = _WIDE_GAP.split(line.strip())
     return wide if len(wide) == width else _CELL.findall(line)
 
@@ -321,18 +322,16 @@ def _names(cells: Sequence[str]) -> set[str]:
     return {plain_name(_QUOTED.sub(r"\1", cell)) for cell in cells}
 
 
-def _separator(
-    lines: Sequence[tuple[str, int]], headers: Sequence[str], wanted: set[str]
-) -> tuple[str, int]:
+def _separator(lines: Sequence[str], headers: Sequence[str], wanted: set[str]) -> tuple[str, int]:
     """Return what parts most wanted names in a header, or the cells of most lines; and how many."""
 
     def merit(separator: str) -> tuple[int, int]:
         common = 0
         for row in headers:
             wide = _WIDE_GAP.split(row.strip()) if separator == BLANKS else []
-            of = (len(wanted & _names(cells)) for cells in (_split(row, separator), wide))
+            of = (len(wanted & _names(cells)) for cells in (_cells_of(row, separator), wide))
             common = max(common, *of)
-        parted = (len(_split(line, separator)) > 1 for line, _ in lines[:_LINES_SEARCHED])
+        parted = (len(_cells_of(line, separator)) > 1 for line in lines[:_LINES_SEARCHED])
         return common, sum(parted)
 
     # Where as many lines have commas as tabs or semicolons, these are decimal commas.
@@ -442,11 +441,8 @@ def _with_header_rows(sheet: Sheet, table: Table, columns: MeasurementBlock) -> 
     for row in range(table.at - 1, max(table.at - _MOST_HEADER_ROWS, 0) - 1, -1):
         if (count := _count_units(sheet.cells[row], columns, read)) > 1:
             units_in[row] = count
-    units_at = max(units_in, key=lambda row: units_in[row], default=None)
-    if units_at is not None and not units_in[units_at]:
-        # Of no unit that is known: what is in brackets, or below the names of a step.
-        likely = (row for row in below if all(map(in_brackets, filter(None, sheet.cells[row]))))
-        units_at = next(likely, below[0] if table.is_step else None)
+    with_units = (row for row, count in units_in.items() if count)
+    units_at = max(with_units, key=lambda row: units_in[row], default=None)
     units = None if units_at is None else sheet.cells[units_at, : len(table.names)].tolist()
     first = max(below, default=table.at) + 1
     return replace(table, units=units, units_at=units_at, first=first)
@@ -502,8 +498,6 @@ def _likely_table(sheet: Sheet) -> Table:
 
 def _end(sheet: Sheet, table: Table, following: Table) -> int:
     """Return the place after the rows of a table, where the preamble of the following begins."""
-    if following.is_step:
-        return max(following.at - 2, table.first)
     end = following.at
     while end > table.first and _in_preamble(sheet.cells[end - 1], len(table.names)):
         end -= 1
@@ -520,7 +514,7 @@ def _in_preamble(cells: Sequence[str], width: int) -> bool:
 def _title(sheet: Sheet, start: int, table: Table) -> str:
     start = table.at - 1 if table.is_step else max(start, table.at - _PREAMBLE_LINES_SHOWN)
     words = (" ".join(filter(None, cells)) for cells in sheet.cells[start : table.at])
-    return "; ".join(shortened(each) for each in words if each)
+    return "; ".join(shortened(line) for line in words if line)
 
 
 def _count_numbers(cells: Sequence[str]) -> int:
@@ -548,14 +542,9 @@ def decimal_mark(cells: Sequence[str], separator: str) -> tuple[str, str]:
     return unclear or (".", "")
 
 
-def number_reader(cells: Sequence[str], decimal: str) -> Callable[[str], float]:
-    """Return what reads cells of a column, as seconds or as numbers with such a decimal mark.
-
-    It gives NaN for a gap, and inf for what it cannot read.
-    """
+def number_reader(decimal: str) -> Callable[[str], float]:
+    """Return what reads numbers with a decimal mark, and gives what `number_or_inf` does."""
     other = ".,".replace(decimal, "")
-    if is_clock(cells):
-        return seconds_or_inf
     return lambda cell: inf if other in cell else number_or_inf(cell.replace(decimal, "."))
 
 

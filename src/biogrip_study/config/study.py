@@ -11,8 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from biogrip.config.case import SampleCase
-from biogrip.config.loading import load, read_configs, refuse, trace_defaults
-from biogrip.config.messages import checked
+from biogrip.config.loading import checked, load, read_configs, refuse, trace_defaults
 from biogrip.config.source import Source, keys_in, overlaid, read_source, values_in
 from biogrip.errors import BiogripError
 from biogrip.fit.experiment import Experiment
@@ -20,9 +19,16 @@ from biogrip.keys import Complaint, below, built, plain
 from biogrip.physics.gripper import CombDrive, Gripper
 from biogrip.physics.instruments import GRIPPER
 from biogrip.physics.protocol import Phase
-from biogrip_study.config.case_blocks import OVERRIDABLE, UNPUBLISHED, CaseBlock, Published
 from biogrip_study.config.shipped import default_config
-from biogrip_study.config.study_blocks import StudyConfig, list_points, point_blocks
+from biogrip_study.config.study_blocks import (
+    OVERRIDABLE,
+    UNPUBLISHED,
+    CaseBlock,
+    Published,
+    StudyConfig,
+    list_points,
+    point_blocks,
+)
 from biogrip_study.gripper.calibration import with_calibration
 from biogrip_study.methods.registry import METHODS, Method
 

@@ -21,9 +21,8 @@ from biogrip.errors import BiogripError
 from biogrip.keys import built
 from biogrip.terminal import collect_less
 from biogrip.traces.measurement_block import MeasurementBlock
-from biogrip_study.config.case_blocks import CaseBlock, Identifiability
 from biogrip_study.config.study import Case, Study
-from biogrip_study.config.study_blocks import StudyConfig
+from biogrip_study.config.study_blocks import CaseBlock, Identifiability, StudyConfig
 from biogrip_study.records.rows import seeds_of
 
 STUDY_KEYS = tuple(field.name for field in fields(StudyConfig))
