@@ -35,10 +35,10 @@ from biogrip.judging.diagnosis import Diagnosis
 from biogrip.judging.doubts import DOUBTFUL, OK, REJECTED
 from biogrip.judging.without_model import LEVEL, level_turned
 from biogrip.page.templates import data_url, environment
-from biogrip.physics.drawing import sketched
 from biogrip.physics.models import Sample
 from biogrip.physics.protocol import evaluate, hold, join_phases, largest_load
 from biogrip.physics.response import simulated_response
+from biogrip.physics.sample_model import sketched
 from biogrip.terminal import visible_lines
 
 _STATUS_MARKS = {OK: "✓", DOUBTFUL: "!", REJECTED: "✕"}

@@ -141,7 +141,9 @@ def interlaced_zeros(weights: NDArray[Any], poles: NDArray[Any], level: NDArray[
         return _real_zeros(weights, poles, level)
     # Samples that differ only in which derivative they carry have the same real parts.
     real = np.concatenate((weights.real, poles.real, level.real[None]))
-    _, first, which = np.unique(real, axis=1, return_index=True, return_inverse=True)
+    numbers = dict[bytes, int]()
+    which = [numbers.setdefault(sample.tobytes(), len(numbers)) for sample in real.T]
+    first = np.unique(which, return_index=True)[1]
     of_some = _real_zeros(weights.real[:, first], poles.real[:, first], level.real[first])
     zeros = Zeros(of_some.pole[:, which], of_some.beyond[:, which])
     # A Newton step is exact for an infinitesimal change of the weights.
