@@ -24,6 +24,7 @@ References
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -61,54 +62,41 @@ def spread_starts(coefficients: Array) -> ComplexArray:
 
 
 def find_zeros(
-    beyond: ComplexArray,
-    newton_step: Callable[[ComplexArray], ComplexArray],
-    origin: Array,
+    points: ComplexArray, newton_step: Callable[[ComplexArray], ComplexArray]
 ) -> ComplexArray:
     """Move points onto the zeros of functions, all zeros of each at once (Ehrlich-Aberth).
 
-    Points are at -origin + beyond, (n, n_points), for each function as many as it has zeros; a
-    Newton step is the function divided by its derivative. The result is what zeros, pairwise at
-    least `SMALLEST_GAP` apart, are beyond the origins.
+    Points are (n, n_points), for each function as many as it has zeros; a Newton step is the
+    function divided by its derivative. The result is zeros, pairwise at least `SMALLEST_GAP` apart.
     """
-    off_diagonal = ~np.eye(beyond.shape[1], dtype=bool)
+    off_diagonal = ~np.eye(points.shape[1], dtype=bool)
     with np.errstate(divide="ignore", invalid="ignore"):
-        converged = resting = np.zeros((len(beyond), 1), dtype=bool)
+        converged = resting = np.zeros((len(points), 1), dtype=bool)
         for _ in range(_MOST_SWEEPS_OF_ROOTS):
-            newton = newton_step(beyond)
-            distance = distances(beyond, origin)
-            repulsion = np.where(off_diagonal, 1 / distance, 0).sum(axis=2)
+            newton = newton_step(points)
+            distances = points[..., None] - points[:, None]
+            repulsion = np.where(off_diagonal, 1 / distances, 0).sum(axis=2)
             step = newton / (1 - newton * repulsion)
             # Converged points rest, so that their last bits do not depend on other functions.
             step = np.where(np.isfinite(step) & ~resting, step, 0)
-            beyond = beyond - step
+            points = points - step
             if np.all(converged):
                 break
             # The error is cubed in a sweep, so one more takes it below rounding.
             resting = converged
-            converged = np.all(np.abs(step) <= 1e-8 * np.abs(beyond), axis=1, keepdims=True)
-    return separate(beyond, origin)
+            converged = np.all(np.abs(step) <= 1e-8 * np.abs(points), axis=1, keepdims=True)
+    return separate(points)
 
 
-def distances(beyond: ComplexArray, origin: Array) -> ComplexArray:
-    """Return the differences of points at -origin + beyond, (n, n_points, n_points)."""
-    return (origin[:, None] - origin[..., None]) + (beyond[..., None] - beyond[:, None])
-
-
-def separate(beyond: ComplexArray, origin: Array) -> ComplexArray:
-    """Move points at -origin + beyond that (nearly) coincide apart to `SMALLEST_GAP`."""
-    first, second = np.triu_indices(beyond.shape[1], 1)
-    size = SMALLEST_GAP * np.abs(beyond - origin)
-    if not np.any(np.abs(distances(beyond, origin)[:, first, second]) < size[:, first]):
-        return beyond
-    beyond = beyond.copy()
-    for i, j in zip(first, second, strict=True):
-        distance = (origin[:, j] - origin[:, i]) + (beyond[:, i] - beyond[:, j])
-        gap = SMALLEST_GAP * (beyond[:, i] - origin[:, i])
+def separate(points: ComplexArray) -> ComplexArray:
+    """Move points of each function, (n, n_points), that coincide apart to `SMALLEST_GAP`."""
+    points = points.copy()
+    for i, j in combinations(range(points.shape[1]), 2):
+        distance, gap = points[:, i] - points[:, j], SMALLEST_GAP * points[:, i]
         lack = np.where(np.abs(distance) < np.abs(gap), 0.5 * (gap - distance), 0)
-        beyond[:, i] += lack
-        beyond[:, j] -= lack
-    return beyond
+        points[:, i] += lack
+        points[:, j] -= lack
+    return points
 
 
 @dataclass(frozen=True)
@@ -155,10 +143,6 @@ def interlaced_zeros(weights: NDArray[Any], poles: NDArray[Any], level: NDArray[
         change += term.imag
         slope -= term.real / distance.real
     return Zeros(zeros.pole, zeros.beyond - 1j * change / slope)
-
-
-# Up to so many points a matrix of poles and points is faster than a loop over the poles.
-_FEW_POINTS = 1000
 
 
 class _Sides(NamedTuple):
@@ -241,17 +225,6 @@ def _intervals(weights: Array, poles: Array, level: Array) -> tuple[Array, Array
 
 def _sides(weights: Array, poles: Array, zero: IntArray, which: IntArray, at: Zeros) -> _Sides:
     """Return the sums at points, of last poles below, `zero`, and functions, pole by pole."""
-    # A lone column would be summed by halves.
-    if 1 < len(zero) <= _FEW_POINTS:
-        terms = weights[:, which] / (slopes := (at.pole - poles[:, which]) + at.beyond)
-        slopes = terms / slopes
-        under = np.arange(len(poles))[:, np.newaxis] <= zero
-        return _Sides(
-            np.add.reduce(terms, axis=0, where=under),
-            0.0 - np.add.reduce(slopes, axis=0, where=under),
-            np.add.reduce(terms, axis=0, where=~under),
-            0.0 - np.add.reduce(slopes, axis=0, where=~under),
-        )
     below, below_slope, above, above_slope = np.zeros((4, len(zero)))
     term, slope = np.empty((2, len(zero)))
     firsts = np.searchsorted(zero, np.arange(len(poles))).tolist()
