@@ -366,7 +366,7 @@ class Ringing:
         """Return G and dG/ds at points, (n, n_points), and all 1/(s + r_j)."""
         away = s[..., None] + self._rates
         least = _LEAST_GAP_OF_ROOTS * self._rates
-        inverse: ComplexArray = 1 / np.where(np.abs(away) < least, least, away)
+        inverse: NDArray[Any] = 1 / np.where(np.abs(away) < least, least, away)
         value = self._k_p + self._c_p * s + (self._k * inverse).sum(axis=2) * s
         slope = self._c_p + (self._k * self._rates * inverse**2).sum(axis=2)
         return value, slope, inverse

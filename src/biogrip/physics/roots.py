@@ -127,13 +127,16 @@ def interlaced_zeros(weights: NDArray[Any], poles: NDArray[Any], level: NDArray[
     """
     if not any(map(np.iscomplexobj, (weights, poles, level))):
         return _real_zeros(weights, poles, level)
-    # Samples that differ only in which derivative they carry have the same real parts.
-    real = np.concatenate((weights.real, poles.real, level.real[None]))
-    numbers = dict[bytes, int]()
-    which = [numbers.setdefault(sample.tobytes(), len(numbers)) for sample in real.T]
-    first = np.unique(which, return_index=True)[1]
-    of_some = _real_zeros(weights.real[:, first], poles.real[:, first], level.real[first])
-    zeros = Zeros(of_some.pole[:, which], of_some.beyond[:, which])
+    real = weights.real, poles.real, level.real
+    if len(poles) > 2:
+        # Samples that differ only in which derivative they carry have the same real parts.
+        numbers, rows = dict[bytes, int](), np.concatenate((*real[:2], real[2][None])).T
+        which = [numbers.setdefault(sample.tobytes(), len(numbers)) for sample in rows]
+        first = np.unique(which, return_index=True)[1]
+        of_some = _real_zeros(*(part[..., first] for part in real))
+        zeros = Zeros(of_some.pole[:, which], of_some.beyond[:, which])
+    else:
+        zeros = _real_zeros(*real)
     # A Newton step is exact for an infinitesimal change of the weights.
     change = -np.imag(level) * np.ones_like(zeros.pole)
     slope = np.zeros_like(zeros.pole)
@@ -143,6 +146,10 @@ def interlaced_zeros(weights: NDArray[Any], poles: NDArray[Any], level: NDArray[
         change += term.imag
         slope -= term.real / distance.real
     return Zeros(zeros.pole, zeros.beyond - 1j * change / slope)
+
+
+# Up to so many points a matrix of poles and points is faster than a loop over the poles.
+_FEW_POINTS = 500
 
 
 class _Sides(NamedTuple):
@@ -225,6 +232,17 @@ def _intervals(weights: Array, poles: Array, level: Array) -> tuple[Array, Array
 
 def _sides(weights: Array, poles: Array, zero: IntArray, which: IntArray, at: Zeros) -> _Sides:
     """Return the sums at points, of last poles below, `zero`, and functions, pole by pole."""
+    # A lone column would be summed by halves.
+    if 1 < len(zero) <= _FEW_POINTS:
+        terms = weights[:, which] / (slopes := (at.pole - poles[:, which]) + at.beyond)
+        slopes = terms / slopes
+        under = np.arange(len(poles))[:, np.newaxis] <= zero
+        return _Sides(
+            np.add.reduce(terms, axis=0, where=under),
+            0.0 - np.add.reduce(slopes, axis=0, where=under),
+            np.add.reduce(terms, axis=0, where=~under),
+            0.0 - np.add.reduce(slopes, axis=0, where=~under),
+        )
     below, below_slope, above, above_slope = np.zeros((4, len(zero)))
     term, slope = np.empty((2, len(zero)))
     firsts = np.searchsorted(zero, np.arange(len(poles))).tolist()
