@@ -412,11 +412,8 @@ class Grip:
 
 def compute_grip(gripper: Gripper, network: Network, course: Course) -> Grip:
     """Compute the extreme forces of the jaws on the first sample, without inertia."""
-
-    def force_at(time_s: Array) -> Array:
-        return linear_jaw_force(gripper, network, course, time_s, inertia=False)[0]
-
-    return extreme_forces(force_at, course)
+    given = gripper, network, course
+    return extreme_forces(lambda time_s: linear_jaw_force(*given, time_s, inertia=False)[0], course)
 
 
 def extreme_forces(force_at: Callable[[Array], Array], course: Course) -> Grip:
