@@ -32,10 +32,10 @@ from biogrip.digits import with_unit
 from biogrip.files import read_table
 from biogrip.fit.least_squares import identify_many
 from biogrip.fit.problem import silent
-from biogrip.physics.drawing import sketched
 from biogrip.physics.models import ALIASES, MODELS
 from biogrip.physics.noise import add_noise, standard_deviation, stream
 from biogrip.physics.response import linear_responses, simulated_response
+from biogrip.physics.sample_model import sketched
 from biogrip_study.config.study import Case
 from biogrip_study.page import answers
 from biogrip_study.records.identifications import share_in_words

@@ -8,8 +8,7 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.command.words import given_in_words, set_up_in_words
-from biogrip.physics.instruments import INSTRUMENTS
-from biogrip.physics.shapes import KNOWN_SHAPES, under_shape
+from biogrip.physics.instruments import INSTRUMENTS, KNOWN_SHAPES, under_shape
 from biogrip.traces.columns import shape_and_sizes
 from biogrip.traces.reader import recording_of_arrays
 from tests.helpers.columns import columns_of

@@ -78,8 +78,8 @@ class _Parser(argparse.ArgumentParser):
 
 def _model_lines() -> list[str]:
     """Return the names, titles and networks of the sample models."""
-    from biogrip.physics.drawing import sketched
     from biogrip.physics.models import ALIASES, MODELS
+    from biogrip.physics.sample_model import sketched
 
     width = max(map(len, MODELS))
     lines = ["", "sample models (other names; prony3, sls3: generalized_maxwell_3 without c_p):"]

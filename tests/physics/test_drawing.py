@@ -4,8 +4,8 @@ import re
 
 import pytest
 
-from biogrip.physics.drawing import sketched
 from biogrip.physics.models import MODELS, Sample
+from biogrip.physics.sample_model import sketched
 from tests.helpers.laplace import IMPEDANCES, series
 
 _OMEGA = (0.02, 0.7, 11.0)

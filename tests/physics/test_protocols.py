@@ -136,17 +136,14 @@ def test_inertia_may_be_left_out_of_the_misfit(gripper: Gripper, steps: Course) 
 
 
 def test_coinciding_roots_are_moved_apart_about_their_mean() -> None:
-    """Whatever they are counted from."""
-    origin = np.array([[0.0, 4.0, 0.0]])
-    beyond = separate(np.array([[-3.0, 1.0, -1.0]], dtype=complex), origin)
-    found = (beyond - origin)[0].real
+    found = separate(np.array([[-3.0, -3.0, -1.0]], dtype=complex))[0].real
     assert abs(found[0] - found[1]) == pytest.approx(3 * SMALLEST_GAP, rel=1e-6)
     assert found[:2].mean() == pytest.approx(-3.0, rel=1e-12)
     assert found[2] == -1.0
-    near = separate(np.array([[-3.0, 1.0 - 1e-6, -1.0]], dtype=complex), origin) - origin
+    near = separate(np.array([[-3.0, -3.0 - 1e-6, -1.0]], dtype=complex))
     assert (near[0, 1] - near[0, 0]).real == pytest.approx(3 * SMALLEST_GAP, rel=1e-6)
     two_pairs = np.array([[-3.0, -1.0, -3.0, -1.0]], dtype=complex)
-    apart = np.sort(separate(two_pairs, np.zeros((1, 4)))[0].real)
+    apart = np.sort(separate(two_pairs)[0].real)
     assert np.diff(apart)[[0, 2]] == pytest.approx([3 * SMALLEST_GAP, SMALLEST_GAP], rel=1e-6)
 
 

@@ -1,6 +1,6 @@
 import pytest
 
-from biogrip.physics.units import inverse_of, per_second_of, suffix_of
+from biogrip.physics.sample_model import inverse_of, per_second_of, suffix_of
 
 # Stiffness, damping, compliance, slope of a compliance, and ends of columns of the first two.
 UNITS = [

@@ -20,10 +20,9 @@ from biogrip.app.window import LARGEST_MB, LONGEST_S, Window
 from biogrip.errors import BiogripError
 from biogrip.files import left_in
 from biogrip.page.templates import environment
-from biogrip.physics.drawing import sketched
-from biogrip.physics.instruments import INSTRUMENTS
+from biogrip.physics.instruments import INSTRUMENTS, KNOWN_SHAPES
 from biogrip.physics.models import CANDIDATES, MODELS
-from biogrip.physics.shapes import KNOWN_SHAPES
+from biogrip.physics.sample_model import sketched
 from biogrip.traces.columns import TIME_UNITS
 from biogrip.traces.reader import form_in_words
 

@@ -35,9 +35,9 @@ from biogrip.judging.cells import Told, compare, gather
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.judging.doubts import DOUBTFUL, OK, REJECTED
 from biogrip.page.templates import data_url, environment
-from biogrip.physics.drawing import sketched
 from biogrip.physics.models import Sample
 from biogrip.physics.protocol import largest_load
+from biogrip.physics.sample_model import sketched
 from biogrip.terminal import visible_lines
 
 _STATUS_MARKS = {OK: "✓", DOUBTFUL: "!", REJECTED: "✕"}

@@ -42,13 +42,13 @@ from biogrip.physics.instruments import (
     FORCE,
     GRIPPER,
     INSTRUMENTS,
+    KNOWN_SHAPES,
     STRAIN,
     STRESS,
     Channel,
     Instrument,
 )
 from biogrip.physics.models import ALIASES, CANDIDATES
-from biogrip.physics.shapes import KNOWN_SHAPES
 from biogrip.traces.columns import held_unit, place, trace_file_problem
 from biogrip.traces.measurement_block import ARRAYS, READINGS, MeasurementBlock
 from biogrip.traces.reader import Recording, read_recording, recording_of_arrays

@@ -43,7 +43,7 @@ from biogrip.judging.profiles import verdict_of
 from biogrip.judging.what_moves import Move, as_moves, find_mistakes
 from biogrip.judging.whiteness import as_correlated, correlated
 from biogrip.physics.residuals import Residuals
-from biogrip.physics.units import inverse_of, per_second_of
+from biogrip.physics.sample_model import inverse_of, per_second_of
 
 # First digits of the times at which quantities are told and, where these are too few, of more.
 _FIRST_DIGITS, _FEWEST_TIMES = ((1,), (1, 2, 5)), 2

@@ -96,12 +96,8 @@ class Gripper(Block):
 # Far below what any sample has, in any units; the squares of its reciprocals are no overflow.
 _TINY = 1e-40
 
-NO_ARMS = Gripper(
-    math.sqrt(0.5),
-    90.0,
-    Arm(0.0, _TINY, _TINY),
-    Arm(0.0, _TINY, _TINY),
-)
+_NO_ARM = Arm(0.0, _TINY, _TINY)
+NO_ARMS = Gripper(math.sqrt(0.5), 90.0, _NO_ARM, _NO_ARM)
 """Arms that do nothing: with a squared lever of 1/2 they turn by what a sample creeps."""
 
 

@@ -5,11 +5,17 @@ stretchers, rheometers. A sample under the force F is displaced by x, F(s) = [k_
 x(s); under a stress it is strained, and its springs and dampers are in Pa and Pa s. Relaxation
 controls a deformation and reads the load that is left: AFM dwells, rheometers. Oscillation strains
 by sines, one frequency after the other, and reads two moduli: rheometers, microrheology.
+
+Shapes stand between a force and a modulus: tips, pipettes, cylinders. Under a load F a sample of
+Young's modulus E yields by the depth d as F = factor E d^n or, as a half-space under a tip, F =
+factor E/(1 - nu^2) d^n with Poisson's ratio nu. So F over the factor is a stress under the strain
+d^n, in a unit of length; of a viscoelastic sample under a tip, too, while the contact does not
+shrink (Lee and Radok, J. Appl. Mech. 27 (1960), 438-444).
 """
 
-import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import pi, sqrt, tan
 from typing import Any
 
 
@@ -113,7 +119,7 @@ TORQUE = Channel(
 ROTATION = Channel(
     "rotation",
     "rad",
-    {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": math.pi / 180},
+    {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": pi / 180},
     "closing rotation",
 )
 GRIPPER = Instrument(
@@ -144,7 +150,7 @@ MODULUS = Channel("modulus", "Pa", STRESS_UNITS)
 RELATIVE_MODULUS = Channel("relative_modulus", "", {"1": 1.0, "%": 1e-2}, "relative modulus")
 
 _STIFFNESSES = {"N/m": 1.0, "mN/m": 1e-3, "N/mm": 1e3, "nN/um": 1e-3, "pN/um": 1e-6, "pN/nm": 1e-3}
-PHASE = Channel("phase", "rad", {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180})
+PHASE = Channel("phase", "rad", {"rad": 1.0, "mrad": 1e-3, "deg": pi / 180})
 LOSS_FACTOR = Channel("loss_factor", "", {"1": 1.0, "%": 1e-2})
 _LOSSES = Channel("loss", "Pa", STRESS_UNITS), PHASE, LOSS_FACTOR
 _STIFF_LOSSES = Channel("loss", "N/m", _STIFFNESSES), PHASE, LOSS_FACTOR
@@ -200,3 +206,91 @@ def in_contact(loads: Any, power: float, deeper: float) -> Any:
 def of_kind(kind: str) -> list[Instrument]:
     """Return the instruments of a kind."""
     return [each for each in INSTRUMENTS.values() if each.kind == kind]
+
+
+INCOMPRESSIBLE = 0.5
+"""Poisson's ratio of samples of which nothing says another."""
+
+# Length of which a depth is a multiple where a shape has none, in m.
+_UNIT_M = 1e-6
+_WALL_FACTOR = 2.1
+
+
+@dataclass(frozen=True)
+class Shape:
+    """What a load and a depth are to a modulus."""
+
+    example: str
+    """Its name and its sizes."""
+    exponent: float
+    """Power of the depth."""
+    factor: Callable[..., float]
+    """Load over modulus and power of the depth, of its sizes, in m or rad."""
+    law: str
+    """The same in words."""
+    source: str
+    """Who found it."""
+    condition: str
+    """When it holds."""
+    load: Channel = FORCE
+    """What presses or sucks."""
+    is_tip: bool = True
+    """True if it touches a half-space, and more of it the deeper it is."""
+
+    @property
+    def sizes(self) -> Channel:
+        """Units that its sizes may have."""
+        return PHASE if self.example.endswith("deg") else DISPLACEMENT
+
+
+KNOWN_SHAPES = {
+    shape.example.partition(" ")[0]: shape
+    for shape in (
+        Shape(
+            *("sphere 2.5 um", 1.5, lambda radius: 4 / 3 * sqrt(radius)),
+            *("F = (4/3) sqrt(R) E/(1 - nu^2) d^1.5", "Hertz 1882", "d is far below R"),
+        ),
+        Shape(
+            *("cone 35 deg", 2.0, lambda angle: 2 / pi * tan(angle)),
+            *("F = (2/pi) tan(a) E/(1 - nu^2) d^2", "Sneddon 1965", "a is that of axis and side"),
+        ),
+        Shape(
+            *("pyramid 17.5 deg", 2.0, lambda angle: 0.7453 * tan(angle)),
+            *("F = 0.7453 tan(a) E/(1 - nu^2) d^2", "Bilodeau 1992"),
+            "it has four sides, and a is that of axis and face",
+        ),
+        Shape(
+            *("punch 2 um", 1.0, lambda radius: 2 * radius),
+            *("F = 2 R E/(1 - nu^2) d", "Sneddon 1965", "its end is flat and all of it touches"),
+        ),
+        Shape(
+            *("pipette 2.5 um", 1.0, lambda radius: 2 * pi / (3 * _WALL_FACTOR * radius)),
+            *("p = 2 pi E d/(3 * 2.1 R)", "Theret 1988", "the cell is far larger than R"),
+            *(STRESS, False),
+        ),
+        Shape(
+            "cylinder 8 mm x 4 mm",
+            *(1.0, lambda diameter, height: pi * diameter**2 / (4 * height)),
+            *("F = pi D^2 E d/(4 h)", "uniaxial compression", "both plates let it slide"),
+            is_tip=False,
+        ),
+    )
+}
+"""Shapes by name."""
+
+
+def under_shape(
+    instrument: Instrument, shape: Shape, sizes: Sequence[float], poisson: float
+) -> Instrument:
+    """Return an instrument of stress and strain that has the load and depth of a shape.
+
+    Sizes are in m or rad. A `KeyError` has a quantity that is neither stress nor strain.
+    """
+    length_m = _UNIT_M if shape.sizes == PHASE else sizes[-1]
+    factor = shape.factor(*sizes) / (1 - poisson**2 if shape.is_tip else 1)
+    stress = 1 / (factor * length_m**shape.exponent)
+    loads = {unit: size * stress for unit, size in shape.load.units.items()}
+    depths = {unit: size / length_m for unit, size in DISPLACEMENT.units.items()}
+    depth = replace(STRAIN, units=depths, label="depth", power=shape.exponent)
+    of = {STRESS: replace(STRESS, units=loads, label=shape.load.name), STRAIN: depth}
+    return replace(instrument, controlled=of[instrument.controlled], read=of[instrument.read])

@@ -103,10 +103,8 @@ def responses_in_turn(
         first, counts = firsts[phases.start], np.diff(firsts[phases.start :])[: len(lasts)]
         phase = np.repeat(np.arange(len(lasts)), counts)
         for some in parts(len(phase), at_once):
-            here, in_phase = (
-                slice(first + some.start, first + min(some.stop, len(phase))),
-                phase[some],
-            )
+            here = slice(first + some.start, first + min(some.stop, len(phase)))
+            in_phase = phase[some]
             elapsed = time_s[here] - course.time_s[phases][in_phase]
             if np.array_equal(elapsed, lasts[in_phase]):
                 # Rows of a record are read at the ends of its phases.

@@ -22,8 +22,8 @@ r_j)^2, a sum of positive terms. Equal arms need no branch of theirs: then 2 phi
 
 With inertia, arms ring. E, or Z + 2 b^2 G, times the product of all s + r_j is a polynomial. The
 iteration that finds its roots needs only its quotient with its derivative, a sum over the branches.
-A root is kept as its distance from the nearest branch, so that it has all digits. Starts are the
-rates without inertia, and the ringing of arms on a sample whose Maxwell dampers are rigid.
+A root so near a branch's rate that digits of their distance are lost has a weight as small. Starts
+are the rates without inertia, and the ringing of arms on a sample whose Maxwell dampers are rigid.
 
 References
 ----------
@@ -40,10 +40,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biogrip.arrays import Array, ComplexArray
-from biogrip.physics.gripper import Arm, Gripper
+from biogrip.physics.gripper import Gripper
 from biogrip.physics.modes import sum_of_responses
 from biogrip.physics.protocol import Course, evaluate
-from biogrip.physics.roots import Zeros, distances, find_zeros, interlaced_zeros, spread_starts
+from biogrip.physics.roots import Zeros, find_zeros, interlaced_zeros, spread_starts
 from biogrip.physics.sample_model import Network, SampleModel
 
 LEFT, RIGHT = 0, 1
@@ -291,8 +291,8 @@ _OFF_REAL_AXIS = 1 + 1e-3j
 # Relative distance to which equal rates of branches are moved apart; the response changes by as
 # much.
 _LEAST_GAP_OF_RATES = 1e-10
-# Share of a branch's rate within which a root is lost in rounding.
-_LEAST_GAP_OF_ROOTS = 1e-15
+# Share of a branch's rate within which a root is lost in rounding; its mode has no weight.
+_LEAST_GAP_OF_ROOTS = 1e-16
 
 
 def ascending_branches(network: Network) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -314,102 +314,71 @@ def ascending(weights: NDArray[Any], rates: NDArray[Any]) -> tuple[NDArray[Any],
 class Ringing:
     """Modes of arms with inertia on n samples with any number of branches.
 
-    Points are at -origin + beyond, (n, n_points): the origin is the rate of a branch, or zero. The
-    zeros are the rates without inertia.
+    The zeros are the rates without inertia.
     """
 
     def __init__(self, gripper: Gripper, network: Network, zeros: Zeros) -> None:
         self._lever_m, self._b_2 = gripper.lever_m, gripper.lever_m**2
         self._alike = gripper.left == gripper.right
-        self._arms = gripper.left, gripper.right
-        left, right = (arm.inertia_kgm2 for arm in self._arms)
-        self._highest = left if self._alike else left * right
+        self._arms = [
+            np.polynomial.Polynomial(
+                (arm.stiffness_Nm_per_rad, arm.damping_Nms_per_rad, arm.inertia_kgm2)
+            )
+            for arm in (gripper.left, gripper.right)
+        ]
+        left, right = self._arms
+        # E is the first and, times b^2 G, the second.
+        self._of_arms = (left, 0 * left + 2) if self._alike else (left * right, left + right)
         self._k_p, self._c_p = network.k_p[:, None], network.c_p[:, None]
         self._k, self._rates = (of.T[:, None] for of in ascending_branches(network))
-        branches, ring = self._k.shape[2], spread_starts(self._ring())
-        # Starts of the iteration: their origins, and distances beyond them.
-        origin = np.concatenate((zeros.pole[:branches].T, np.zeros(ring.shape)), axis=1)
-        beyond = np.concatenate((-zeros.beyond[:branches].T * _OFF_REAL_AXIS, ring), axis=1)
-        beyond = find_zeros(beyond, lambda points: self._newton_step(origin, points), origin)
-        self.rates = s = beyond - origin
+        slow = -zeros.values[: self._k.shape[2]].T * _OFF_REAL_AXIS
+        starts = np.concatenate((slow, spread_starts(self._with_rigid_dampers())), axis=1)
+        self.rates = s = find_zeros(starts, self._newton_step)
         """Roots of E in 1/s, (n, n_modes)."""
-        away = (self._rates - origin[..., None]) + beyond[..., None]
-        # From another start than that of its branch, a root may be found that is nearer to a very
-        # weak branch than rounding. Its mode has no weight.
-        lost = (np.abs(away) < _LEAST_GAP_OF_ROOTS * self._rates) & (
-            self._rates != origin[..., None]
-        )
-        inverse = 1 / np.where(lost, _LEAST_GAP_OF_ROOTS**2 * self._rates, away)
-        self._sample = self._k_p + self._c_p * s + (self._k * inverse).sum(axis=2) * s
+        self._sample, _, inverse = self._of_sample(s)
         # dE/ds: the polynomial's, a product over root distances, over all s + r_j. Of roots that
         # nearly coincide it fits their distance.
-        factors = distances(beyond, origin)
+        factors = s[..., None] - s[:, None]
         factors[:, np.arange(s.shape[1]), np.arange(s.shape[1])] = 1
         factors[..., : inverse.shape[2]] *= inverse
-        self._slope = self._highest * factors.prod(axis=2)
+        self._slope = self._of_arms[0].coef[-1] * factors.prod(axis=2)
 
     def weights(self, *, force: bool) -> ComplexArray:
         """Return weights, (n_arms, n_modes, n), of rotations or the force in N, per N m."""
         left, right = [np.ones_like(self.rates)] * 2
         if not self._alike:
-            left, right = (_impedance_of_arm(arm, self.rates) for arm in self._arms)
+            left, right = (arm(self.rates) for arm in self._arms)
         pressing = [self._lever_m * self._sample * (left + right)] if force else [right, left]
         weights: ComplexArray = np.array(pressing) / (self.rates * self._slope)
         return weights.swapaxes(1, 2)
 
-    def _ring(self) -> Array:
+    def _with_rigid_dampers(self) -> Array:
         """Return E with a spring and a damper as sample, ascending powers, (n, terms)."""
-        spring_and_damper = self._b_2 * np.concatenate(
-            (self._k_p + self._k.sum(axis=2), self._c_p), axis=1
-        )
-        z_2, z_4 = (_polynomial(arm) for arm in self._arms)
-        arms, factor = (z_2, np.array([2.0])) if self._alike else (np.convolve(z_2, z_4), z_2 + z_4)
-        terms = np.tile(arms, (len(spring_and_damper), 1))
-        for power, of_power in enumerate(factor):
-            terms[:, power : power + 2] += of_power * spring_and_damper
+        springs = self._b_2 * (self._k_p + self._k.sum(axis=2))
+        arms, factor = (np.asarray(of.coef, dtype=float) for of in self._of_arms)
+        terms = np.tile(arms, (len(springs), 1))
+        for power, of_power in enumerate(factor[: len(arms) - 1]):
+            terms[:, power] += of_power * springs[:, 0]
+            terms[:, power + 1] += of_power * self._b_2 * self._c_p[:, 0]
         return terms
 
-    def _newton_step(self, origin: Array, beyond: ComplexArray) -> ComplexArray:
+    def _of_sample(self, s: ComplexArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+        """Return G and dG/ds at points, (n, n_points), and all 1/(s + r_j)."""
+        away = s[..., None] + self._rates
+        least = _LEAST_GAP_OF_ROOTS * self._rates
+        inverse: NDArray[Any] = 1 / np.where(np.abs(away) < least, least, away)
+        value = self._k_p + self._c_p * s + (self._k * inverse).sum(axis=2) * s
+        slope = self._c_p + (self._k * self._rates * inverse**2).sum(axis=2)
+        return value, slope, inverse
+
+    def _newton_step(self, s: ComplexArray) -> ComplexArray:
         """Return the polynomial, E times all s + r_j, divided by its derivative."""
-        s = beyond - origin
-        away = (self._rates - origin[..., None]) + beyond[..., None]
-        at_origin = self._rates == origin[..., None]
-        inverse = np.where(at_origin, 0, 1 / away)
-        arms, arms_slope, factor, factor_slope = self._of_arms(s)
-        others = self._b_2 * (self._k_p + self._c_p * s + (self._k * inverse).sum(axis=2) * s)
-        others_slope = self._b_2 * (self._c_p + (self._k * self._rates * inverse**2).sum(axis=2))
-        value = arms + factor * others
-        slope = arms_slope + factor_slope * others + factor * others_slope
-        # At the origin of a branch: value and slope times s + r.
-        spring = self._b_2 * np.where(at_origin, self._k, 0).sum(axis=2)
-        is_at_origin = np.any(at_origin, axis=2)
-        whole = value + beyond * slope + spring * (factor_slope * s + factor)
-        slope = np.where(is_at_origin, whole, slope)
-        value = np.where(is_at_origin, beyond * value + spring * factor * s, value)
+        sample, sample_slope, inverse = self._of_sample(s)
+        arms, factor = self._of_arms
+        value = arms(s) + self._b_2 * factor(s) * sample
+        of_factor = factor.deriv()(s) * sample + factor(s) * sample_slope
+        slope = arms.deriv()(s) + self._b_2 * of_factor
         return value / (slope + value * inverse.sum(axis=2))
-
-    def _of_arms(
-        self, s: ComplexArray
-    ) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
-        """Return the summand beside b^2 G, and the factor of b^2 G, each with its derivative."""
-        (left, left_slope), (right, right_slope) = (
-            (_impedance_of_arm(arm, s), 2 * arm.inertia_kgm2 * s + arm.damping_Nms_per_rad)
-            for arm in self._arms
-        )
-        if self._alike:
-            return left, left_slope, np.full_like(s, 2), np.zeros_like(s)
-        product_slope = left_slope * right + left * right_slope
-        return left * right, product_slope, left + right, left_slope + right_slope
-
-
-def _polynomial(arm: Arm) -> Array:
-    return np.array([arm.stiffness_Nm_per_rad, arm.damping_Nms_per_rad, arm.inertia_kgm2])
-
-
-def _impedance_of_arm(arm: Arm, s: ComplexArray) -> ComplexArray:
-    """Return the impedance of a free arm."""
-    k, c, inertia = _polynomial(arm)
-    return k + s * (c + s * inertia)
 
 
 # Forces below this share of the largest one are rounding errors.
@@ -443,11 +412,8 @@ class Grip:
 
 def compute_grip(gripper: Gripper, network: Network, course: Course) -> Grip:
     """Compute the extreme forces of the jaws on the first sample, without inertia."""
-
-    def force_at(time_s: Array) -> Array:
-        return linear_jaw_force(gripper, network, course, time_s, inertia=False)[0]
-
-    return extreme_forces(force_at, course)
+    given = gripper, network, course
+    return extreme_forces(lambda time_s: linear_jaw_force(*given, time_s, inertia=False)[0], course)
 
 
 def extreme_forces(force_at: Callable[[Array], Array], course: Course) -> Grip:

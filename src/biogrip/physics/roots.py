@@ -24,6 +24,7 @@ References
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -61,54 +62,41 @@ def spread_starts(coefficients: Array) -> ComplexArray:
 
 
 def find_zeros(
-    beyond: ComplexArray,
-    newton_step: Callable[[ComplexArray], ComplexArray],
-    origin: Array,
+    points: ComplexArray, newton_step: Callable[[ComplexArray], ComplexArray]
 ) -> ComplexArray:
     """Move points onto the zeros of functions, all zeros of each at once (Ehrlich-Aberth).
 
-    Points are at -origin + beyond, (n, n_points), for each function as many as it has zeros; a
-    Newton step is the function divided by its derivative. The result is what zeros, pairwise at
-    least `SMALLEST_GAP` apart, are beyond the origins.
+    Points are (n, n_points), for each function as many as it has zeros; a Newton step is the
+    function divided by its derivative. The result is zeros, pairwise at least `SMALLEST_GAP` apart.
     """
-    off_diagonal = ~np.eye(beyond.shape[1], dtype=bool)
+    off_diagonal = ~np.eye(points.shape[1], dtype=bool)
     with np.errstate(divide="ignore", invalid="ignore"):
-        converged = resting = np.zeros((len(beyond), 1), dtype=bool)
+        converged = resting = np.zeros((len(points), 1), dtype=bool)
         for _ in range(_MOST_SWEEPS_OF_ROOTS):
-            newton = newton_step(beyond)
-            distance = distances(beyond, origin)
-            repulsion = np.where(off_diagonal, 1 / distance, 0).sum(axis=2)
+            newton = newton_step(points)
+            distances = points[..., None] - points[:, None]
+            repulsion = np.where(off_diagonal, 1 / distances, 0).sum(axis=2)
             step = newton / (1 - newton * repulsion)
             # Converged points rest, so that their last bits do not depend on other functions.
             step = np.where(np.isfinite(step) & ~resting, step, 0)
-            beyond = beyond - step
+            points = points - step
             if np.all(converged):
                 break
             # The error is cubed in a sweep, so one more takes it below rounding.
             resting = converged
-            converged = np.all(np.abs(step) <= 1e-8 * np.abs(beyond), axis=1, keepdims=True)
-    return separate(beyond, origin)
+            converged = np.all(np.abs(step) <= 1e-8 * np.abs(points), axis=1, keepdims=True)
+    return separate(points)
 
 
-def distances(beyond: ComplexArray, origin: Array) -> ComplexArray:
-    """Return the differences of points at -origin + beyond, (n, n_points, n_points)."""
-    return (origin[:, None] - origin[..., None]) + (beyond[..., None] - beyond[:, None])
-
-
-def separate(beyond: ComplexArray, origin: Array) -> ComplexArray:
-    """Move points at -origin + beyond that (nearly) coincide apart to `SMALLEST_GAP`."""
-    first, second = np.triu_indices(beyond.shape[1], 1)
-    size = SMALLEST_GAP * np.abs(beyond - origin)
-    if not np.any(np.abs(distances(beyond, origin)[:, first, second]) < size[:, first]):
-        return beyond
-    beyond = beyond.copy()
-    for i, j in zip(first, second, strict=True):
-        distance = (origin[:, j] - origin[:, i]) + (beyond[:, i] - beyond[:, j])
-        gap = SMALLEST_GAP * (beyond[:, i] - origin[:, i])
+def separate(points: ComplexArray) -> ComplexArray:
+    """Move points of each function, (n, n_points), that coincide apart to `SMALLEST_GAP`."""
+    points = points.copy()
+    for i, j in combinations(range(points.shape[1]), 2):
+        distance, gap = points[:, i] - points[:, j], SMALLEST_GAP * points[:, i]
         lack = np.where(np.abs(distance) < np.abs(gap), 0.5 * (gap - distance), 0)
-        beyond[:, i] += lack
-        beyond[:, j] -= lack
-    return beyond
+        points[:, i] += lack
+        points[:, j] -= lack
+    return points
 
 
 @dataclass(frozen=True)
@@ -139,11 +127,16 @@ def interlaced_zeros(weights: NDArray[Any], poles: NDArray[Any], level: NDArray[
     """
     if not any(map(np.iscomplexobj, (weights, poles, level))):
         return _real_zeros(weights, poles, level)
-    # Samples that differ only in which derivative they carry have the same real parts.
-    real = np.concatenate((weights.real, poles.real, level.real[None]))
-    _, first, which = np.unique(real, axis=1, return_index=True, return_inverse=True)
-    of_some = _real_zeros(weights.real[:, first], poles.real[:, first], level.real[first])
-    zeros = Zeros(of_some.pole[:, which], of_some.beyond[:, which])
+    real = weights.real, poles.real, level.real
+    if len(poles) > 2:
+        # Samples that differ only in which derivative they carry have the same real parts.
+        numbers, rows = dict[bytes, int](), np.concatenate((*real[:2], real[2][None])).T
+        which = [numbers.setdefault(sample.tobytes(), len(numbers)) for sample in rows]
+        first = np.unique(which, return_index=True)[1]
+        of_some = _real_zeros(*(part[..., first] for part in real))
+        zeros = Zeros(of_some.pole[:, which], of_some.beyond[:, which])
+    else:
+        zeros = _real_zeros(*real)
     # A Newton step is exact for an infinitesimal change of the weights.
     change = -np.imag(level) * np.ones_like(zeros.pole)
     slope = np.zeros_like(zeros.pole)
@@ -156,7 +149,7 @@ def interlaced_zeros(weights: NDArray[Any], poles: NDArray[Any], level: NDArray[
 
 
 # Up to so many points a matrix of poles and points is faster than a loop over the poles.
-_FEW_POINTS = 1000
+_FEW_POINTS = 500
 
 
 class _Sides(NamedTuple):

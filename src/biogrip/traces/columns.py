@@ -17,14 +17,15 @@ from biogrip.physics.instruments import (
     DISPLACEMENT,
     FORCE,
     INSTRUMENTS,
+    KNOWN_SHAPES,
     MODULUS,
     PHASE,
     ROTATION,
     STRAIN,
     STRESS,
     Channel,
+    Shape,
 )
-from biogrip.physics.shapes import KNOWN_SHAPES, Shape
 from biogrip.terminal import visible
 
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0, "d": 86_400.0}

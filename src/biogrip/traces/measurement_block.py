@@ -13,6 +13,7 @@ from pydantic import Field, Tag
 
 from biogrip.keys import BY_KIND, Block, Complaint, Distinct, OneOf
 from biogrip.physics.instruments import (
+    INCOMPRESSIBLE,
     INSTRUMENTS,
     PARTNERS,
     ROTATION,
@@ -20,9 +21,9 @@ from biogrip.physics.instruments import (
     STRESS,
     Channel,
     Instrument,
+    under_shape,
 )
 from biogrip.physics.noise import Noise
-from biogrip.physics.shapes import INCOMPRESSIBLE, under_shape
 from biogrip.traces.columns import AXES, shape_and_sizes, trace_file_problem
 
 COLOURED = "coloured"

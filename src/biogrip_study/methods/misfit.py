@@ -17,9 +17,9 @@ from functools import cached_property
 import numpy as np
 
 from biogrip.arrays import Array, IntArray
+from biogrip.physics.condensed import DECAYED, ORDERS, PIECE_WIDTH, WIDE_NODES, in_short_pieces
 from biogrip.physics.gripper import Arm, Gripper
 from biogrip.physics.protocol import Course
-from biogrip.physics.rate_tables import DecayTable
 from biogrip.physics.residuals import Residuals
 from biogrip.physics.roots import zeros_of_one_branch
 from biogrip.physics.sample_model import Network, SampleModel
@@ -27,6 +27,40 @@ from biogrip.physics.sample_model import Network, SampleModel
 Misfits = Callable[[Array, IntArray], Array]
 """Function from parameters of populations, (n_populations, n, n_parameters), and the index of the
 trace of each, (n_populations,), to RMS misfits in the unit of the readings, (n_populations, n)."""
+
+
+# Short pieces in a wide one, see `biogrip.physics.condensed`.
+_SHORTER = 32
+
+
+class DecayTable:
+    """Sums of decaying exponentials at any rate from 0 to -infinity.
+
+    They are given by a function of rates, (n,), to (n_sums, n), with the largest t_i; the smallest
+    above zero is one.
+    """
+
+    def __init__(self, function: Callable[[Array], Array], longest: float) -> None:
+        self._longest = longest
+        pieces = np.ceil(np.log1p(DECAYED * longest) / PIECE_WIDTH)
+        u = PIECE_WIDTH * (np.arange(pieces)[:, None] + WIDE_NODES)
+        values = function(-np.expm1(u).ravel() / longest).reshape(-1, *u.shape)
+        powers = in_short_pieces(values, _SHORTER).reshape(len(values), -1, len(ORDERS))
+        self._powers = np.ascontiguousarray(np.moveaxis(powers, 2, 0))
+        self._end = np.nextafter(powers.shape[1], 0)
+
+    def __call__(self, which: IntArray, rates: Array) -> Array:
+        """Return sums of some indices, each at rates of its own; both broadcast."""
+        place = np.fmin(np.log(1 - self._longest * rates) / (PIECE_WIDTH / _SHORTER), self._end)
+        piece = place.astype(np.intp)
+        place -= piece
+        piece = piece + which * self._powers.shape[2]
+        powers = self._powers.reshape(len(ORDERS), -1)
+        sums: Array = powers[-1].take(piece)
+        for power in powers[-2::-1]:
+            sums *= place
+            sums += power.take(piece)
+        return sums
 
 
 def make_misfits(residuals: Sequence[Residuals]) -> Misfits:
