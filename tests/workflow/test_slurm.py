@@ -1,7 +1,11 @@
 import importlib.util
 import os
+import re
+import shlex
+import shutil
 import subprocess
 import sys
+import textwrap
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -11,10 +15,12 @@ from typing import Any
 
 import pytest
 
+from biogrip.cli import main
 from tests.helpers.identified import FEW, write_drop
+from tests.helpers.mixed_table import write_mixed
 from tests.helpers.places import ROOT
 from tests.helpers.required import cannot_run
-from tests.helpers.runs import ONE_CASE, snakemake
+from tests.helpers.runs import ONE_CASE, clone, ran, snakemake
 from tests.helpers.slurm.cluster import missing_packages, one_node_slurm
 
 pytestmark = pytest.mark.nightly
@@ -23,6 +29,7 @@ PLUGIN = "snakemake_executor_plugin_slurm"
 REQUIRED = "BIOGRIP_REQUIRE_SLURM"
 # Of the site, not of the study: no accounting to ask, and nobody else who would mind the asking.
 SITE = ("--slurm-status-command", "squeue", "--slurm-init-seconds-before-status-checks", "1")
+PROFILE = ("--profile", ROOT / "profiles" / "slurm", *SITE)
 
 
 @pytest.fixture
@@ -74,7 +81,7 @@ def test_slurm_gives_the_same_bytes(
     snakemake(here, "--", *TABLES, config=FEW_JOBS)
     for name, value in slurm.items():
         monkeypatch.setenv(name, value)
-    profile = ("--profile", ROOT / "profiles" / "slurm", *SITE, "--config", "batch_size=2")
+    profile = (*PROFILE, "--config", "batch_size=2")
     with ThreadPoolExecutor() as pool:
         running = pool.submit(snakemake, there, *profile, "--", *TABLES, config=FEW_JOBS)
         while not running.done() and not _cancel_a_batch(slurm):
@@ -85,6 +92,50 @@ def test_slurm_gives_the_same_bytes(
     # Slurm's executor says so where a rule has no resources.
     for missing in ("No wall time information", "No job memory information"):
         assert missing not in run
+
+
+TABLE = "results/tables/traces.csv"
+BLOCK = re.compile(r"^ *```(\w+)(?: title=\"([^\"]+)\")?\n(.*?)^ *```$", re.DOTALL | re.MULTILINE)
+
+
+def test_the_page_on_clusters_gives_one_table_thrice(
+    tmp_path: Path, slurm: dict[str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its files written and its commands typed as they stand, but for what a site needs."""
+    for name, value in slurm.items():
+        monkeypatch.setenv(name, value)
+    clone(tmp_path)
+    for name in ("profiles", "data"):
+        shutil.copytree(ROOT / name, tmp_path / name)
+    tables = []
+    for language, title, content in BLOCK.findall((ROOT / "docs" / "cluster.md").read_text()):
+        if title:
+            (tmp_path / title).write_text(textwrap.dedent(content))
+        for line in content.splitlines() if language == "sh" and "traces.csv" in content else ():
+            typed = shlex.split(line.replace(".venv/bin/", ""))
+            more = SITE if "--profile" in typed else ()
+            at = typed.index("--") if "--" in typed else len(typed)
+            ran(tmp_path, *typed[:at], *more, *typed[at:])
+            tables.append((tmp_path / (TABLE if "--" in typed else "found.csv")).read_bytes())
+            shutil.rmtree(tmp_path / "results", ignore_errors=True)
+    assert len(tables) == 3
+    assert tables[0].count(b"\n") == 4
+    assert tables == 3 * tables[:1]
+
+
+def test_slurm_gives_the_table_of_many_instruments(
+    tmp_path: Path, slurm: dict[str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of two actuators and arms, and of samples of a creep, a relaxation and a sweep each."""
+    assert write_mixed(tmp_path, gripped=48, samples=4) == 60
+    for name, value in slurm.items():
+        monkeypatch.setenv(name, value)
+    traces = TRACES | {"config": "lab.yaml", "model": "maxwell", "rows_a_batch": 13}
+    snakemake(tmp_path, *PROFILE, "--", TABLE, config={"traces": traces})
+    monkeypatch.chdir(tmp_path)
+    typed = ("--config", "lab.yaml", "--model", "maxwell", "--csv", "found.csv")
+    assert main(["identify", "cells.tsv", *typed]) == 0
+    assert (tmp_path / TABLE).read_bytes() == (tmp_path / "found.csv").read_bytes()
 
 
 def _cancel_a_batch(slurm: dict[str, str]) -> bool:
