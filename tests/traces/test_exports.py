@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from biogrip.command.options import Setting
+from biogrip.command.settings import Asked, is_table
 from biogrip.errors import BiogripError
 from biogrip.traces.conditions import are_repeats, tells_apart
 from biogrip.traces.reader import read_recording
@@ -89,6 +91,48 @@ def test_blocks_that_are_one_test_are_joined(tmp_path: Path, begins: str) -> Non
     assert "allowed is one, as by --block 1, or several that are one test, as by --block 1,2." in (
         message
     )
+
+
+PREAMBLE = ["Data Series Information", "Name: cell gel 7 creep", "Operator: A B", ""]
+
+
+def test_tabs_part_cells_that_have_blanks_or_nothing(tmp_path: Path) -> None:
+    """RheoPlus: words of a preamble have blanks, the first unit is empty, and so are some cells."""
+    rows = [f"{i}\t{'' if i % 3 else 25}\t{i / 60:.9f}\t{10 + i}\t" for i in range(1, 9)]
+    header = ["Meas. Pts.\tT\tElapsed time\tShear Strain\tGap", "\t[°C]\t[min]\t[%]\t[mm]"]
+    keys = {"time": "Elapsed time", "reading": "Shear Strain"}
+    found = read(tmp_path / "t.txt", [*PREAMBLE, *header, *rows], **keys)
+    # Times are written with nine decimals.
+    np.testing.assert_allclose(found.time_s, np.arange(1, 9), atol=1e-7)
+    np.testing.assert_allclose(found.readings, (10 + np.arange(1, 9)) / 100)
+    assert (found.form["separator"], found.form["units_line"], found.gaps) == ("tabs", 6, 0)
+    # Names between blanks in a comment, and rows between tabs.
+    commented = ["# n T t_min x_% gap", *rows]
+    found = read(tmp_path / "t.txt", commented, time="t_min", reading="x_%")
+    np.testing.assert_allclose(found.readings, (10 + np.arange(1, 9)) / 100)
+    # Names between tabs, and rows between blanks.
+    found = read(tmp_path / "t.txt", ["t_s\tx_%", *(f"{i}   {i}" for i in range(9))], **TX)
+    np.testing.assert_allclose(found.readings, np.arange(9) / 100)
+
+
+TX = {"time": "t_s", "reading": "x_%"}
+
+
+def test_a_preamble_of_a_step_is_no_table(tmp_path: Path) -> None:
+    """TRIOS: its pairs of words are above ``[step]``, which stands in brackets like units."""
+    step = ["[step]", "Creep", "Time\tStrain", "s\t%", *(f"{i}\t{10 + i}" for i in range(8))]
+    later = [line.replace("\t1", "\t2") for line in step]
+    text = ["Filename\tgel 7", "Sample name\tgel A", "", *step, "", *later]
+    keys = {"time": "Time", "reading": "Strain"}
+    found = read(tmp_path / "t.txt", text, **keys, block=2)
+    np.testing.assert_allclose(found.readings, (20 + np.arange(8)) / 100)
+    assert found.form["blocks"] == 2
+    given = {("measurement", "time"): "Time", ("measurement", "strain"): "Strain"}
+    settings = tuple(Setting("", key, name) for key, name in given.items())
+    assert not is_table(Asked(tmp_path / "t.txt", settings=settings))
+    # A sheet, whose row names these columns, is one.
+    (tmp_path / "sheet.csv").write_text("filename,time,strain\na.csv,Time,Strain\n")
+    assert is_table(Asked(tmp_path / "sheet.csv"))
 
 
 def test_a_block_that_is_not_wanted_is_left_out(tmp_path: Path) -> None:

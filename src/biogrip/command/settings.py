@@ -190,14 +190,19 @@ def _laid_over(blocks: dict[str, Any], setting: Setting) -> dict[str, Any]:
 
 
 def is_table(asked: Asked) -> bool:
-    """Return True if the first line of a file is a header with a column `file`, and no trace's."""
+    """Return True if the first line of a file is a header with a column `file`, and no trace's.
+
+    Nor is it one of a preamble, as ``Filename`` of TRIOS, above the names that are to be read.
+    """
     with asked.trace.open("rb") as stream:
-        line = stream.readline(_HEAD_BYTES).decode("utf-8-sig", "replace")
-    names = [cell.strip(' "\r\n') for cell in re.split(f"[{SEPARATORS}]", line)]
+        lines = stream.read(_HEAD_BYTES).decode("utf-8-sig", "replace").splitlines()
+    parted = (re.split(f"[{SEPARATORS}]", line) for line in lines)
+    rows = [{cell.strip(' "'): None for cell in cells} for cells in parted] or [{}]
     measured = measured_keys(asked.given)
     readings = {measured[key] for key in READINGS if key in measured} or {"rotation_rad"}
-    of_trace = measured.get("time", "time_s") in names and readings & {*names}
-    return file_column(names) is not None and not of_trace
+    axes = {measured.get("time", "time_s"), measured.get("frequency")}
+    of_trace = any(axes & row.keys() and readings & row.keys() for row in rows)
+    return file_column([*rows[0]]) is not None and not of_trace
 
 
 def file_column(names: Sequence[str]) -> str | None:
