@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from biogrip.arrays import Array
 from biogrip.command.options import Setting
 from biogrip.command.settings import Asked, is_table
 from biogrip.errors import BiogripError
-from biogrip.traces.conditions import are_repeats, tells_apart
+from biogrip.traces.conditions import alike, how_they_differ, tells_apart
 from biogrip.traces.reader import read_recording
 from tests.helpers.columns import columns_of
 
@@ -190,11 +191,62 @@ def test_repeats_are_told_from_conditions_at_the_level() -> None:
     clean = np.exp(0.1 * places)
     noisy = [clean * rng.normal(1, 0.02, 45) for _ in range(2000)]
     # A binomial of 2 exceeds 12 once in a million times.
-    assert sum(not are_repeats(places, values[:, None]) for values in noisy) <= 12
+    for sweeps in (False, True):
+        told = (how_they_differ(places, values[:, None], sweeps=sweeps) for values in noisy)
+        assert sum(map(bool, told)) <= 12
     # These scatter by ten times the noise.
     apart = np.repeat([1.0, 1.25, 1.5], 15)
-    told = [are_repeats(places, (values * apart)[:, None]) for values in noisy[:200]]
-    assert sum(told) <= 4
+    conditions = ((values * apart)[:, None] for values in noisy[:200])
+    assert sum(not how_they_differ(places, of, sweeps=False) for of in conditions) <= 4
+
+
+def swept(rng: np.random.Generator, *sizes: float) -> tuple[Array, Array]:
+    """Return frequencies and both moduli of a Zener solid, with 2 % noise, thirteen a sweep."""
+    hertz = np.tile(np.geomspace(0.1, 31.6, 13), len(sizes))
+    maxwell = 300 / (1 - 1j / (hertz / 1.6))
+    moduli = np.array([100 + maxwell.real, maxwell.imag]) * np.repeat(sizes, 13)
+    return hertz, (moduli * rng.normal(1, 0.02, moduli.shape)).T
+
+
+def test_sweeps_that_differ_are_no_repeats_though_they_are_coarse(tmp_path: Path) -> None:
+    """Of two strains, which are measured, and up and down, of which no column tells."""
+    rng = np.random.default_rng(3)
+    keys = {"frequency": "f (Hz)", "reading": "G' (Pa)", "quantity": "storage", "loss": "G'' (Pa)"}
+    hertz, moduli = swept(rng, 1, 0.8)
+    strain = np.repeat([1, 5], 13) * rng.normal(1, 0.015, 26)
+    rows = [
+        f"{f:.4g},{e:.4g},{g:.4g},{h:.4g}"
+        for f, e, (g, h) in zip(hertz, strain, moduli, strict=True)
+    ]
+    text = ["f (Hz),Strain (%),G' (Pa),G'' (Pa)", *rows]
+    for averaged in (False, True):
+        message = said(tmp_path / "t.csv", text, **keys, average_repeated=averaged)
+        assert "--rows 'Strain (%)=" in message
+    wanted = float(message.rpartition("=")[2].rstrip("'."))
+    found = read(tmp_path / "t.csv", text, **keys, rows={"Strain (%)": wanted})
+    assert found.lines.tolist() == [*range(14, 1, -1), *range(2, 15)]
+    # Without the column.
+    text = [",".join(np.delete(row.split(","), 1)) for row in text]
+    message = said(tmp_path / "t.csv", text, **keys)
+    # Of ln 0.8, with noise of 2 % * sqrt(2/26) of the mean: five of its deviations are 3 %.
+    shift = float(message.partition("moduli that differ by ")[2].partition(" %")[0])
+    assert abs(shift - 22.3) < 3
+    remarks = read(tmp_path / "t.csv", text, **keys, average_repeated=True).remarks()
+    assert any("Rows that were averaged differ by" in text for text in remarks)
+    # Repeats have one place: of 200 a fifth of one is blamed, a Poisson that exceeds 4 once in 1e5.
+    repeats = (swept(rng, 1, 1) for _ in range(200))
+    blamed = (how_they_differ(np.log(f), of, sweeps=True) for f, of in repeats)
+    assert sum(map(bool, blamed)) <= 4
+
+
+def test_measured_numbers_of_one_condition_are_alike() -> None:
+    scattered = ["0.98", "1.01", "1.03", "4.9", "5.05", "5.1"]
+    assert alike(scattered, 1.0) == {*scattered[:3]}
+    assert alike(scattered, 5.02) == {*scattered[3:]}
+    assert alike(scattered, 3.0) == {*()}
+    # These come again, and are set: none is measured.
+    again = 4 * ["1.05", "1.1", "1.15", "9.5", "9.6", "9.7"]
+    assert alike(again, 1.1) == {"1.1"}
 
 
 def test_two_columns_may_tell_apart_and_an_index_does_not() -> None:

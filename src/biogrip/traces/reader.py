@@ -41,6 +41,7 @@ _DECIMAL = {".": "point", ",": "comma"}
 # What `Recording.remarks` says of parts of its form.
 _REMARKS = {
     "averaged": "Averaged at repeated {axis}: {}.",
+    "repeats": "Rows that were averaged {}: they are no repeats.",
     "outside": "Left out by from_s and until_s: {}.",
     "others": "Left out, for rows asks for others: {}.",
     "unclear": "The {decimal} of {} is read as a decimal mark; where it is between thousands, "
@@ -188,7 +189,9 @@ def read_recording(path: Path, columns: MeasurementBlock) -> Recording:
     parts = [_read_block(path, sheet, tables[place], columns) for place in places]
     values, lines, units, form, remarks = _joined_blocks(columns, parts)
     load, chosen = None, np.concatenate([part.chosen for part in parts])
-    _check_conditions(path, columns, values[chosen], lines[chosen], sheet, tables[places[0]])
+    differ = _check_conditions(
+        path, columns, values[chosen], lines[chosen], sheet, tables[places[0]]
+    )
     if columns.load is not None:
         history, values = values[:, [0, -1]], values[:, :-1]
         numbers = ~np.any(np.isnan(history), axis=1)
@@ -216,6 +219,7 @@ def read_recording(path: Path, columns: MeasurementBlock) -> Recording:
         "rows": len(values),
         **recording.form,
         "others": int(np.count_nonzero(~chosen)) or None,
+        "repeats": differ or None,
         **(_signs_of_a_cut(sheet, tables[-1]) if max(places) + 1 == len(tables) else {}),
     }
     form = {key: value for key, value in form.items() if value is not None}
@@ -536,7 +540,7 @@ def _chosen(path: Path, sheet: Sheet, table: Table, columns: MeasurementBlock) -
     if not columns.rows:
         return chosen
     # Imported here, as below: most traces are of one condition.
-    from biogrip.traces.conditions import is_like
+    from biogrip.traces.conditions import alike
 
     line = int(sheet.numbers[table.at]) or None
     for column, wanted in columns.rows.items():
@@ -544,8 +548,7 @@ def _chosen(path: Path, sheet: Sheet, table: Table, columns: MeasurementBlock) -
             raise BiogripError(_no_column(path, line, column, table.names))
         cells = [str(cell) for cell in sheet.cells[table.first : table.end, same[0]]]
         values = [*dict.fromkeys(cells)]
-        fits = {cell for cell in values if is_like(cell, wanted)}
-        if not fits:
+        if not (fits := alike(cells, wanted)):
             text = f"found no row with '{wanted}', allowed are {listed(values, 10)}."
             raise BiogripError(f"{place(path, line, column)}: {text}{nearest(wanted, values)}")
         chosen &= [cell in fits for cell in cells]
@@ -559,19 +562,23 @@ def _check_conditions(
     lines: IntArray,
     sheet: Sheet,
     table: Table,
-) -> None:
-    """Refuse rows of several conditions; the message names the column that tells them apart."""
+) -> str:
+    """Refuse rows of several conditions; the message names the column that tells them apart.
+
+    Return how rows differ that are averaged, if by more than noise.
+    """
     numbers = ~np.any(np.isnan(values), axis=1)
     places, lines = values[numbers, 0], lines[numbers]
     falls = columns.axis == "time" and bool(np.any(np.diff(places) < 0))
     if not falls and len(np.unique(places)) == len(places):
-        return
-    from biogrip.traces.conditions import are_repeats, tells_apart
+        return ""
+    from biogrip.traces.conditions import how_they_differ, tells_apart
 
     sweeps = columns.axis == "frequency"
     scale = np.log(places) if sweeps and np.all(places > 0) else places
-    if not falls and are_repeats(scale, values[numbers, 1:]):
-        return
+    differ = how_they_differ(scale, values[numbers, 1:], sweeps=sweeps)
+    if not (falls or differ):
+        return ""
     read = {index for name in columns.named.values() for index in table.indices(name)}
     rows = sheet.cells[np.searchsorted(sheet.numbers, lines)]
     others = {n: rows[:, i].tolist() for i, n in enumerate(table.names) if n and i not in read}
@@ -582,10 +589,10 @@ def _check_conditions(
         ways = (f"--rows {quote(f'{name}={values[0]}')}" for name, values in condition.items())
         way = f"as by {' '.join(ways)}"
     elif sweeps and not columns.average_repeated:
-        said = "with moduli that differ by more than noise, as of several conditions"
+        said = f"with moduli that {differ}, as of several conditions"
         way = "in a file of their own or with a column that tells them apart"
     else:
-        return
+        return differ
     raise BiogripError(
         f"{place(path)}: found {_PLURALS[columns.axis]} again and again, {said}; allowed are rows "
         f"of one condition, {way}."
