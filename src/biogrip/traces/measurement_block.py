@@ -264,6 +264,13 @@ class MeasurementBlock(Block):
         """Return the options of the command that say keys, for messages."""
         return " and ".join(map(_option, keys))
 
+    @property
+    def deepened(self) -> str:
+        """What makes a tip's load positive in contact, for messages."""
+        if self.load_scale is None:
+            return f"turn it by {self.said_by('load_scale')}"
+        return "its zero is where the tip touches, as of a height less that of the contact"
+
     def unit_key(self, key: str) -> str:
         """Return the key that says the unit of a column of `named`."""
         if key in (self.axis, "load"):

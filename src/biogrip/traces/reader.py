@@ -612,7 +612,7 @@ def _load(
     if columns.has_tip and not np.any(sizes > 0):
         raise BiogripError(
             f"{place(path, lines[0], columns.load)}: found nothing above zero, allowed is a "
-            f"depth or a force of a tip in contact: turn it by {columns.said_by('load_scale')}."
+            f"depth or a force of a tip in contact: {columns.deepened}."
         )
     # Before its contact a tip does not press; where it touches may be fitted.
     pressed = columns.has_tip and columns.tip_power is None
