@@ -43,6 +43,7 @@ from biogrip.physics.instruments import (
     GRIPPER,
     INSTRUMENTS,
     KNOWN_SHAPES,
+    LOSS,
     STRAIN,
     STRESS,
     Channel,
@@ -68,7 +69,7 @@ _PROTOCOLS = (HOLD, LOAD, ("protocol",))
 _UNSAFE = re.compile(r"[^\w .,=()+-]")
 _PRONY = re.compile(r"(?:prony|sls)_?([1-8])")
 # Of each group of keys of the measurement, the one that is set last replaces the others.
-_ONE_OF = {"start_s", "fit_start"}, {*READINGS}
+_ONE_OF = {"start_s", "fit_start"}, {*READINGS} - {LOSS.name}
 _MOST_SHOWN = 10
 SEPARATORS = ",;\t"
 """What separates the cells of a table of traces."""
@@ -292,6 +293,9 @@ def _with_instrument(
     blocks |= {"instrument": kind, "measurement": measurement}
     block = checked(MeasurementBlock, measurement)[0]
     controlled = (instrument if block is None else block.instrument).controlled
+    if instrument.read == LOSS and "sample" not in given:
+        said = "loss: of a loss modulus alone no springs are told that do not relax"
+        raise BiogripError(f"{said}; allowed with a model, as by --model zener_maxwell.")
     if instrument.sweeps and held is not None:
         raise BiogripError(f"{by}: is of a trace in time, not of a sweep; leave it out.")
     if not instrument.sweeps and held is None and measurement.get(LOAD[-1]) is None:

@@ -355,11 +355,12 @@ def _checked(
                 f"{place(path, lines[row], column)}: found {values[row, index]:.15g}, allowed is a "
                 "standard deviation above 0."
             )
-    if columns.partner:
+    sweeps = columns.instrument.sweeps
+    if sweeps:
         ascending = np.argsort(values[:, 0], kind="stable")
         values, lines = values[ascending], lines[ascending]
     in_si = AXES[columns.axis][units[0]]
-    clock = values[:, 0] * (1.0 if columns.partner else in_si)
+    clock = values[:, 0] * (1.0 if sweeps else in_si)
     used = clock >= (-np.inf if columns.from_s is None else columns.from_s)
     used &= clock <= (np.inf if columns.until_s is None else columns.until_s)
     values, lines, averaged = values[used], lines[used], 0
@@ -369,7 +370,7 @@ def _checked(
     _check_order(path, columns, values[:, 0], lines)
     time_s = values[:, 0] * in_si
     quantity, scale = columns.instrument.read, columns.scale or 1.0
-    end = "rad_per_s" if columns.partner else "s"
+    end = "rad_per_s" if sweeps else "s"
     form = {
         "gaps": without_number,
         "averaged": averaged or None,
@@ -381,11 +382,17 @@ def _checked(
     unit = quantity.units[units[1]] * scale
     if columns.sd is not None:
         sd = values[:, 2] * abs(unit) * quantity.slope(values[:, 1] * unit)
+    for row in np.flatnonzero(values[:, 0] <= 0)[:1] if sweeps else ():
+        found = f"found a frequency of {values[row, 0]:.3g}; allowed is one above 0"
+        raise BiogripError(f"{place(path, lines[row])}: {found}.")
     if columns.partner:
-        moduli = _both_moduli(path, columns, units, values, lines)
+        moduli = _both_moduli(columns, units, values)
         sd = None if sd is None else joined(time_s, *(abs(unit) * values[:, 3:].T))[1]
         time_s, readings = joined(time_s, *moduli)
         lines = np.append(lines[::-1], lines)
+    elif sweeps:
+        time_s, readings, lines = -time_s[::-1], readings[::-1], lines[::-1]
+        sd = None if sd is None else sd[::-1]
     form = {key: value for key, value in form.items() if value is not None}
     of_file = path, columns, (units[0], units[1])
     return Recording(time_s, readings, lines, *of_file, sd=sd, gaps=without_number, form=form)
@@ -400,15 +407,10 @@ def _no_column(
     return f"{place(path, line)}: there is no column '{visible(column)}'. {there}"
 
 
-def _both_moduli(
-    path: Path | None, columns: MeasurementBlock, units: list[str], values: Array, lines: IntArray
-) -> tuple[Array, Array]:
+def _both_moduli(columns: MeasurementBlock, units: list[str], values: Array) -> tuple[Array, Array]:
     """Return storage and loss moduli of a sweep, (n_rows,) in SI units."""
     partner, read, scale = columns.partner, columns.instrument.read, columns.scale or 1.0
     assert partner is not None
-    for row in np.flatnonzero(values[:, 0] <= 0)[:1]:
-        found = f"found a frequency of {values[row, 0]:.3g}; allowed is one above 0"
-        raise BiogripError(f"{place(path, lines[row])}: {found}.")
     first = values[:, 1] * (read.units[units[1]] * scale)
     if read is VISCOSITY:
         first = first * values[:, 0] * AXES[columns.axis][units[0]]
