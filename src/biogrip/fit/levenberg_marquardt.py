@@ -244,15 +244,16 @@ def _free_step(gradient: Array, information: Array, damping: Array, fixed: BoolA
     return -scale * _solved(matrix, scale * gradient)
 
 
+# Singular ones, as of a trace without noise, have no solution: their steps, NaN, are not taken.
+@np.errstate(divide="ignore", invalid="ignore")
 def _solved(matrix: Array, vector: Array) -> Array:
     """Solve small positive definite systems, each step of elimination for all: for speed."""
     a, b = matrix.transpose(1, 2, 0).copy(), vector.T.copy()
-    size = len(b)
-    for row in range(size - 1):
+    for row in range(len(b) - 1):
         share = a[row + 1 :, row] / a[row, row]
         a[row + 1 :, row + 1 :] -= share[:, None] * a[row, row + 1 :]
         b[row + 1 :] -= share * b[row]
-    for row in range(size)[::-1]:
+    for row in range(len(b))[::-1]:
         b[row] /= a[row, row]
         b[:row] -= a[:row, row] * b[row]
     return b.T
