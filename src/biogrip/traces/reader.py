@@ -89,8 +89,8 @@ class Recording:
     """Time of the clock at which the protocol starts, if that was given or fitted."""
     gaps: int = 0
     """Number of rows left out for want of a number."""
-    at_steps: tuple[float, ...] = ()
-    """Times by the clock of readings that were left out where a sample may jump."""
+    at_steps: tuple[tuple[float, float], ...] = ()
+    """Readings that were left out where a sample may jump, with their times by the clock."""
     load_noise: float = 0.0
     """Standard deviation of what was smoothed out of `load`, as a share of its largest value."""
     form: Mapping[str, Any] = field(default_factory=dict)
@@ -144,7 +144,7 @@ class Recording:
             begins = ", when the protocol is taken to start" * form["clock"].startswith("dates")
             said.append(f"Times are {form['clock']}{begins * (self.onset_s is None)}.")
         if self.at_steps:
-            times = ", ".join(f"{time_s:.6g} s" for time_s in self.at_steps)
+            times = ", ".join(f"{time_s:.6g} s" for time_s, _ in self.at_steps)
             said.append(
                 "Left out where a sample may jump, at a step or where the rate of a deformation "
                 "jumps, since nothing tells on which side they were taken: "
