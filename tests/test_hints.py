@@ -210,7 +210,15 @@ def test_advice_beside_a_result_helps(tmp_path: Path, make: object) -> None:
 
 KINDS = {
     "typed here": (
-        *("--block 1", "--block 1,2", "--rows ", "--set measurement.", "--reading ", "--reading"),
+        *(
+            "--block 1",
+            "--block 1,2",
+            "is one, as by --block 1,",
+            "--rows ",
+            "--set measurement.",
+            "--reading ",
+            "--reading",
+        ),
         *(", as --reading ", ", as by --reading ", " Which quantity is it? Say so, as by --read"),
         " with --load ",
         *(': say its unit, as in --hold "', " Readings are weighted by --noise-share "),
@@ -218,7 +226,7 @@ KINDS = {
         " s on: what is said holds while it grows or stays. Leave these readings out: --until ",
     ),
     "typed by tests of onsets, contacts and damaged results": (
-        "time that it remembers of that: --from, ",
+        *("time that it remembers of that: --from, ", " s after the step of the protocol, as if"),
         *("--start says when", "). If it does, say --start fit", "say --contact fit"),
         *(" came. Say when the protocol started (--start", "It is damaged: the same command with"),
     ),

@@ -133,7 +133,7 @@ class Recording:
         form = self.form
         for key, text in _REMARKS.items():
             if form.get(key):
-                found = form[key] if isinstance(form[key], str) else counted(form[key], "row")
+                found = form[key] if isinstance(form[key], str) else counted(form[key], "reading")
                 said.append(text.format(found, axis=_PLURALS[self.read.axis], **form))
         if self.load_noise:
             said.append(
