@@ -211,7 +211,6 @@ def test_advice_beside_a_result_helps(tmp_path: Path, make: object) -> None:
 KINDS = {
     "typed here": (
         *(
-            "--block 1",
             "--block 1,2",
             "is one, as by --block 1,",
             "--rows ",
@@ -226,9 +225,12 @@ KINDS = {
         " s on: what is said holds while it grows or stays. Leave these readings out: --until ",
     ),
     "typed by tests of onsets, contacts and damaged results": (
-        *("time that it remembers of that: --from, ", " s after the step of the protocol, as if"),
+        *(
+            " times as wide. If it was moved before, leave",
+            " s after the step of the protocol, as if",
+        ),
         *("--start says when", "). If it does, say --start fit", "say --contact fit"),
-        *(" came. Say when the protocol started (--start", "It is damaged: the same command with"),
+        "It is damaged: the same command with",
     ),
     "names an option whose value only its reader knows": (
         *(" rad, or less with a given noise (--noise) ", ", or it is below the noise: say how"),
