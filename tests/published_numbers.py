@@ -22,8 +22,8 @@ PUBLISHED = ROOT / "results" / "published"
 BENCHMARKS = ROOT / "benchmarks" / "results" / "benchmarks.json"
 
 _NUMBER = re.compile(
-    r"(<!--= *(?P<table>[\w/]+)(\[(?P<rows>[^\]]*)\])?\.(?P<column>[\w.]+) *\\?\| *(?P<how>[^ |\\]+?)"
-    r" *(\\?\| *(?P<each>each) *)?-->)[^<]*(<!--/-->)"
+    r"(<!--= *(?P<table>[\w/]+)(\[(?P<rows>[^\]]*)\])?\.(?P<column>[\w.]+)"
+    r" *\\?\| *(?P<how>[^ |\\]+?) *(\\?\| *(?P<each>each) *)?-->)[^<]*(<!--/-->)"
 )
 
 
