@@ -234,12 +234,16 @@ KINDS = {
     ),
     "names an option whose value only its reader knows": (
         *(" rad, or less with a given noise (--noise) ", ", or it is below the noise: say how"),
-        "what is before or after (--from, --until)",
+        *("what is before or after (--from, --until)", "; allowed with a model, as by --model"),
         *("A ramp is given by --ramp DURATION", " % at the highest: correct for it, or leave"),
         " A length is a strain by a scale or",
         *(" A pressure sucks into a pipette", "that reading (--from)"),
         *(" Or say what is read, as by --reading ", ". Say which, as in --reading loss=COLUMN."),
-        *("; give yours with --config.", " that was held, a column of it by --load, or a pro"),
+        *(
+            "; give yours with --config.",
+            "; allowed with a model, as by --model",
+            " that was held, a column of it by --load, or a pro",
+        ),
         *(" s. Is the unit of time right?", " units. If these are what was repeated, cells"),
     ),
     "refuses": (

@@ -148,6 +148,13 @@ def test_a_ramp_and_a_dwell_of_other_tips_tell_the_modulus(tmp_path: Path, text:
     given += ["--model", "sls", "--no-compare", "--start", "0"]
     _, _, message = identify(trace, *given)
     assert "turn it by --set measurement.load_scale=-1." in message
+    # So turned, depths of its negative are heights without a zero.
+    write_trace(
+        trace, time_s, 1e9 * force, 1e9 * depth + 100, header="time_s,force_nN,separation_nm"
+    )
+    _, _, message = identify(trace, *given, "--set", "measurement.load_scale=-1")
+    assert "its zero is where the tip touches" in message
+    write_trace(trace, *columns, header="time_s,force_nN,separation_nm")
     turned = identified(tmp_path, trace, *given, "--set", "measurement.load_scale=-1", config="")
     for name, true in (("k", STIFF_PA), ("k_p", SOFT_PA), ("tau", TIME_S)):
         assert by_quantity(turned)[name]["value"] == pytest.approx(true, rel=0.015), name

@@ -69,6 +69,34 @@ def test_every_model_has_the_moduli_of_its_impedance_and_their_slopes(name: str)
         assert np.max(np.abs((ahead - behind) / (2 * step) - slope)) < 1e-7 * size.max()
 
 
+def test_a_loss_modulus_alone_tells_what_relaxes(tmp_path: Path) -> None:
+    """Of a Zener solid with 3 % noise: limits of 95 %, of all but the spring that does not relax.
+
+    That 20 sweeps have 16 or fewer within them is a chance of 3 in 1000; seeds are the first.
+    """
+    clean, within = moduli("zener_maxwell", OMEGA, *SOLID.values())[1], dict.fromkeys("kc", 0)
+    for seed in range(20):
+        found = told(OMEGA, noisy(clean, 0.03, seed), reads="loss", model="sls").to_frame()
+        for name in within:
+            within[name] += found.loc[name, "low"] <= SOLID[name] <= found.loc[name, "high"]
+        assert found.loc["k_p", "verdict"] == "not determined"
+    assert min(within.values()) > 16
+    rows = OMEGA[::-1], noisy(clean, 0.03)[::-1], np.full(25, 2.0)
+    path = write_trace(tmp_path / "t.csv", *rows, header="w in rad/s,lost in Pa,sd")
+    given = ["--frequency", "w in rad/s", "--reading", "loss=lost in Pa"]
+    code, _, message = identify(path, *given)
+    assert (code, "--model zener_maxwell" in message) == (1, True)
+    figure = tmp_path / "t.png"
+    given += ["--model", "zener_maxwell", "--sd", "sd", "--plot", str(figure)]
+    data = identified(tmp_path, path, *given, config="")
+    assert figure.exists()
+    assert "without storage moduli" in set_up_in_words(data)[0]
+    assert by_quantity(data)["k"]["value"] == pytest.approx(3000, rel=0.03)
+    for more in ("phase_sd_rad=0.1", "loss_sd=sd"):
+        _, _, message = identify(path, *given, "--set", f"measurement.{more}")
+        assert "only the loss modulus is read" in message
+
+
 def measured(sweep: str) -> Array:
     """Frequencies, storage and loss moduli, by row."""
     return np.loadtxt(Path(__file__).parent / "sweeps" / f"{sweep}.csv", delimiter=",").T

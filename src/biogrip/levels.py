@@ -217,8 +217,9 @@ CONDITIONS = 1e-3
 """Level at which readings of equal times or frequencies are no repeats: of a thousand files with
 repeats one is taken for several conditions."""
 
-MEASURED_ALIKE = 0.01
-"""Share by which numbers of one condition scatter, as 19.9 and 20.1 for 20. Chosen."""
+MEASURED_ALIKE, APART = 0.01, 3.0
+"""Share by which numbers of one condition may differ, as 19.9 and 20, and the gap between
+conditions over the widest of one from which on measured numbers are of several. Chosen."""
 
 LIKELIER = 6.0
 """Deviance by which shares of each modulus are clearly likelier than an amplitude and a phase: by

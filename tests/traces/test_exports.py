@@ -9,8 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from biogrip.arrays import Array
+from biogrip.command.options import Setting
+from biogrip.command.settings import Asked, is_table
 from biogrip.errors import BiogripError
-from biogrip.traces.conditions import are_repeats, tells_apart
+from biogrip.traces.conditions import alike, how_they_differ, tells_apart
 from biogrip.traces.reader import read_recording
 from tests.helpers.columns import columns_of
 
@@ -91,6 +94,48 @@ def test_blocks_that_are_one_test_are_joined(tmp_path: Path, begins: str) -> Non
     )
 
 
+PREAMBLE = ["Data Series Information", "Name: cell gel 7 creep", "Operator: A B", ""]
+
+
+def test_tabs_part_cells_that_have_blanks_or_nothing(tmp_path: Path) -> None:
+    """RheoPlus: words of a preamble have blanks, the first unit is empty, and so are some cells."""
+    rows = [f"{i}\t{'' if i % 3 else 25}\t{i / 60:.9f}\t{10 + i}\t" for i in range(1, 9)]
+    header = ["Meas. Pts.\tT\tElapsed time\tShear Strain\tGap", "\t[°C]\t[min]\t[%]\t[mm]"]
+    keys = {"time": "Elapsed time", "reading": "Shear Strain"}
+    found = read(tmp_path / "t.txt", [*PREAMBLE, *header, *rows], **keys)
+    # Times are written with nine decimals.
+    np.testing.assert_allclose(found.time_s, np.arange(1, 9), atol=1e-7)
+    np.testing.assert_allclose(found.readings, (10 + np.arange(1, 9)) / 100)
+    assert (found.form["separator"], found.form["units_line"], found.gaps) == ("tabs", 6, 0)
+    # Names between blanks in a comment, and rows between tabs.
+    commented = ["# n T t_min x_% gap", *rows]
+    found = read(tmp_path / "t.txt", commented, time="t_min", reading="x_%")
+    np.testing.assert_allclose(found.readings, (10 + np.arange(1, 9)) / 100)
+    # Names between tabs, and rows between blanks.
+    found = read(tmp_path / "t.txt", ["t_s\tx_%", *(f"{i}   {i}" for i in range(9))], **TX)
+    np.testing.assert_allclose(found.readings, np.arange(9) / 100)
+
+
+TX = {"time": "t_s", "reading": "x_%"}
+
+
+def test_a_preamble_of_a_step_is_no_table(tmp_path: Path) -> None:
+    """TRIOS: its pairs of words are above ``[step]``, which stands in brackets like units."""
+    step = ["[step]", "Creep", "Time\tStrain", "s\t%", *(f"{i}\t{10 + i}" for i in range(8))]
+    later = [line.replace("\t1", "\t2") for line in step]
+    text = ["Filename\tgel 7", "Sample name\tgel A", "", *step, "", *later]
+    keys = {"time": "Time", "reading": "Strain"}
+    found = read(tmp_path / "t.txt", text, **keys, block=2)
+    np.testing.assert_allclose(found.readings, (20 + np.arange(8)) / 100)
+    assert found.form["blocks"] == 2
+    given = {("measurement", "time"): "Time", ("measurement", "strain"): "Strain"}
+    settings = tuple(Setting("", key, name) for key, name in given.items())
+    assert not is_table(Asked(tmp_path / "t.txt", settings=settings))
+    # A sheet, whose row names these columns, is one.
+    (tmp_path / "sheet.csv").write_text("filename,time,strain\na.csv,Time,Strain\n")
+    assert is_table(Asked(tmp_path / "sheet.csv"))
+
+
 def test_a_block_that_is_not_wanted_is_left_out(tmp_path: Path) -> None:
     blocks = [["t_s,strain", *(f"{i},{b}" for i in range(5 * b, 5 * b + 5))] for b in range(3)]
     text = [line for block in blocks for line in block]
@@ -146,11 +191,62 @@ def test_repeats_are_told_from_conditions_at_the_level() -> None:
     clean = np.exp(0.1 * places)
     noisy = [clean * rng.normal(1, 0.02, 45) for _ in range(2000)]
     # A binomial of 2 exceeds 12 once in a million times.
-    assert sum(not are_repeats(places, values[:, None]) for values in noisy) <= 12
+    for sweeps in (False, True):
+        told = (how_they_differ(places, values[:, None], sweeps=sweeps) for values in noisy)
+        assert sum(map(bool, told)) <= 12
     # These scatter by ten times the noise.
     apart = np.repeat([1.0, 1.25, 1.5], 15)
-    told = [are_repeats(places, (values * apart)[:, None]) for values in noisy[:200]]
-    assert sum(told) <= 4
+    conditions = ((values * apart)[:, None] for values in noisy[:200])
+    assert sum(not how_they_differ(places, of, sweeps=False) for of in conditions) <= 4
+
+
+def swept(rng: np.random.Generator, *sizes: float) -> tuple[Array, Array]:
+    """Return frequencies and both moduli of a Zener solid, with 2 % noise, thirteen a sweep."""
+    hertz = np.tile(np.geomspace(0.1, 31.6, 13), len(sizes))
+    maxwell = 300 / (1 - 1j / (hertz / 1.6))
+    moduli = np.array([100 + maxwell.real, maxwell.imag]) * np.repeat(sizes, 13)
+    return hertz, (moduli * rng.normal(1, 0.02, moduli.shape)).T
+
+
+def test_sweeps_that_differ_are_no_repeats_though_they_are_coarse(tmp_path: Path) -> None:
+    """Of two strains, which are measured, and up and down, of which no column tells."""
+    rng = np.random.default_rng(3)
+    keys = {"frequency": "f (Hz)", "reading": "G' (Pa)", "quantity": "storage", "loss": "G'' (Pa)"}
+    hertz, moduli = swept(rng, 1, 0.8)
+    strain = np.repeat([1, 5], 13) * rng.normal(1, 0.015, 26)
+    rows = [
+        f"{f:.4g},{e:.4g},{g:.4g},{h:.4g}"
+        for f, e, (g, h) in zip(hertz, strain, moduli, strict=True)
+    ]
+    text = ["f (Hz),Strain (%),G' (Pa),G'' (Pa)", *rows]
+    for averaged in (False, True):
+        message = said(tmp_path / "t.csv", text, **keys, average_repeated=averaged)
+        assert "--rows 'Strain (%)=" in message
+    wanted = float(message.rpartition("=")[2].rstrip("'."))
+    found = read(tmp_path / "t.csv", text, **keys, rows={"Strain (%)": wanted})
+    assert found.lines.tolist() == [*range(14, 1, -1), *range(2, 15)]
+    # Without the column.
+    text = [",".join(np.delete(row.split(","), 1)) for row in text]
+    message = said(tmp_path / "t.csv", text, **keys)
+    # Of ln 0.8, with noise of 2 % * sqrt(2/26) of the mean: five of its deviations are 3 %.
+    shift = float(message.partition("moduli that differ by ")[2].partition(" %")[0])
+    assert abs(shift - 22.3) < 3
+    remarks = read(tmp_path / "t.csv", text, **keys, average_repeated=True).remarks()
+    assert any("Rows that were averaged differ by" in text for text in remarks)
+    # Repeats have one place: of 200 a fifth of one is blamed, a Poisson that exceeds 4 once in 1e5.
+    repeats = (swept(rng, 1, 1) for _ in range(200))
+    blamed = (how_they_differ(np.log(f), of, sweeps=True) for f, of in repeats)
+    assert sum(map(bool, blamed)) <= 4
+
+
+def test_measured_numbers_of_one_condition_are_alike() -> None:
+    scattered = ["0.98", "1.01", "1.03", "4.9", "5.05", "5.1"]
+    assert alike(scattered, 1.0) == {*scattered[:3]}
+    assert alike(scattered, 5.02) == {*scattered[3:]}
+    assert alike(scattered, 3.0) == {*()}
+    # These come again, and are set: none is measured.
+    again = 4 * ["1.05", "1.1", "1.15", "9.5", "9.6", "9.7"]
+    assert alike(again, 1.1) == {"1.1"}
 
 
 def test_two_columns_may_tell_apart_and_an_index_does_not() -> None:

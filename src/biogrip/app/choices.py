@@ -51,7 +51,7 @@ def likely_choices(numbers: Mapping[str, Array]) -> dict[str, str]:
     elif reading == DISPLACEMENT.name and STRESS.name in columns:
         # A pipette sucks.
         load = STRESS.name
-    partner = next((name for name in PARTNERS if name in columns), "")
+    partner = next((name for name in PARTNERS if name in columns and name != reading), "")
     chosen = {"column": reading, "load": load, "partner_column": partner}
     chosen |= {axis: axis for axis in AXES}
     named = {key: columns.get(quantity, "") for key, quantity in chosen.items()}
@@ -84,7 +84,7 @@ def options_typed(chosen: Mapping[str, str]) -> list[str]:
 def with_option(option: str, value: str, more: str) -> dict[str, str]:
     """Return what to choose for an option: its field, or else more options."""
     quantity, _, column = value.partition("=")
-    if option == "--reading" and quantity in INSTRUMENTS:
+    if option == "--reading" and quantity in INSTRUMENTS.keys() - PARTNERS.keys():
         return {"reading": quantity, "column": column}
     if (name := option.removeprefix("--")) in CHOICES:
         return {name: value or "on"}

@@ -43,6 +43,7 @@ from biogrip.physics.instruments import (
     GRIPPER,
     INSTRUMENTS,
     KNOWN_SHAPES,
+    LOSS,
     STRAIN,
     STRESS,
     Channel,
@@ -68,7 +69,7 @@ _PROTOCOLS = (HOLD, LOAD, ("protocol",))
 _UNSAFE = re.compile(r"[^\w .,=()+-]")
 _PRONY = re.compile(r"(?:prony|sls)_?([1-8])")
 # Of each group of keys of the measurement, the one that is set last replaces the others.
-_ONE_OF = {"start_s", "fit_start"}, {*READINGS}
+_ONE_OF = {"start_s", "fit_start"}, {*READINGS} - {LOSS.name}
 _MOST_SHOWN = 10
 SEPARATORS = ",;\t"
 """What separates the cells of a table of traces."""
@@ -190,14 +191,19 @@ def _laid_over(blocks: dict[str, Any], setting: Setting) -> dict[str, Any]:
 
 
 def is_table(asked: Asked) -> bool:
-    """Return True if the first line of a file is a header with a column `file`, and no trace's."""
+    """Return True if the first line of a file is a header with a column `file`, and no trace's.
+
+    Nor is it one of a preamble, as ``Filename`` of TRIOS, above the names that are to be read.
+    """
     with asked.trace.open("rb") as stream:
-        line = stream.readline(_HEAD_BYTES).decode("utf-8-sig", "replace")
-    names = [cell.strip(' "\r\n') for cell in re.split(f"[{SEPARATORS}]", line)]
+        lines = stream.read(_HEAD_BYTES).decode("utf-8-sig", "replace").splitlines()
+    parted = (re.split(f"[{SEPARATORS}]", line) for line in lines)
+    rows = [{cell.strip(' "'): None for cell in cells} for cells in parted] or [{}]
     measured = measured_keys(asked.given)
     readings = {measured[key] for key in READINGS if key in measured} or {"rotation_rad"}
-    of_trace = measured.get("time", "time_s") in names and readings & {*names}
-    return file_column(names) is not None and not of_trace
+    axes = {measured.get("time", "time_s"), measured.get("frequency")}
+    of_trace = any(axes & row.keys() and readings & row.keys() for row in rows)
+    return file_column([*rows[0]]) is not None and not of_trace
 
 
 def file_column(names: Sequence[str]) -> str | None:
@@ -287,6 +293,9 @@ def _with_instrument(
     blocks |= {"instrument": kind, "measurement": measurement}
     block = checked(MeasurementBlock, measurement)[0]
     controlled = (instrument if block is None else block.instrument).controlled
+    if instrument.read == LOSS and "sample" not in given:
+        said = "loss: of a loss modulus alone no springs are told that do not relax"
+        raise BiogripError(f"{said}; allowed with a model, as by --model zener_maxwell.")
     if instrument.sweeps and held is not None:
         raise BiogripError(f"{by}: is of a trace in time, not of a sweep; leave it out.")
     if not instrument.sweeps and held is None and measurement.get(LOAD[-1]) is None:

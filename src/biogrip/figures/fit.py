@@ -167,7 +167,7 @@ def draw_sweep(fit: FittedTrace, title: str) -> Figure:
     for name, of, marker, face in (
         ("storage", storage, "o", style.BLUE),
         ("loss", ~storage, "s", "white"),
-    ):
+    )[not np.any(storage) :]:
         color = style.BLUE if name == "storage" else style.FITTED
         points: dict[str, Any] = look | {"marker": marker, "color": color, "markerfacecolor": face}
         omega, residual = np.abs(fit.time_s[of]), 100 * (fit.measured / fit.fitted - 1)[of]

@@ -64,8 +64,9 @@ def deepen(problems: Sequence[TraceProblem], fits: Sequence[Fit]) -> list[Fit]:
         return [*fits]
     springs, tries, starts = [spring for spring, _ in pairs], len(pairs) * _TRIED_TIMES, []
     for problem, fit in zip(problems, fits, strict=True):
-        time_s, best = problem.residuals.trace.time_s, np.log(fit.parameters)
-        tried = np.log(np.geomspace(np.diff(time_s).min(), time_s[-1], _TRIED_TIMES))
+        residuals, best = problem.residuals, np.log(fit.parameters)
+        shortest_s, _ = residuals.course.spread_s(residuals.trace.time_s)
+        tried = np.log(np.geomspace(shortest_s, residuals.duration_s, _TRIED_TIMES))
         for (spring, damper), log_time in product(pairs, tried):
             start = best.copy()
             start[spring] = np.mean(best[springs])

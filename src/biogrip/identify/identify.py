@@ -126,8 +126,9 @@ def identify_alike(
 def _notes_on_trace(judged: Diagnosis, on_fit: list[Note], opinion: list[Note]) -> Iterator[Note]:
     """Yield notes on the reading of a trace, its fit, its start, and terms not declared."""
     recording, experiment = judged.identified
+    differ = recording.form.get("repeats")
     for text in recording.remarks():
-        yield Note(HARMLESS, text)
+        yield Note(DOUBT if differ and differ in text else HARMLESS, text)
     if fixed := " and ".join(experiment.fixed):
         were = "were" if len(experiment.fixed) > 1 else "was"
         yield Note(HARMLESS, f"Other models are not compared, because {fixed} {were} fixed.")

@@ -449,8 +449,7 @@ def _check_contact(recording: Recording) -> None:
         raise BiogripError(
             f"{recording.place(at, columns.reading_column)}: found the largest reading where the "
             f"column '{columns.load}' is not above zero, as of a separation that is negative in "
-            f"contact; allowed is a depth or a force of a tip in contact: turn it by "
-            f"{columns.said_by('load_scale')}."
+            f"contact; allowed is a depth or a force of a tip in contact: {columns.deepened}."
         )
 
 

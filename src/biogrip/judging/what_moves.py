@@ -75,7 +75,8 @@ def find_mistakes(residuals: Residuals, response: Response) -> Iterator[Mistake]
     if residuals.course.sweeps:
         turned = np.where(is_storage(time_s), -1.0, 1.0) * shown[::-1]
         yield Mistake("gain", gain, _WRONG_SHARE * shown)
-        yield Mistake("phase", "the phase is read 1 degree too large", _WRONG_PHASE * turned)
+        if np.any(is_storage(time_s)):
+            yield Mistake("phase", "the phase is read 1 degree too large", _WRONG_PHASE * turned)
         return
     zero = np.full(len(time_s), _WRONG_SHARE * float(np.max(np.abs(shown))))
     yield Mistake("zero", "the zero is 1 % of the peak too high", zero)

@@ -266,7 +266,8 @@ def find_inertia(
     squared = np.where(is_storage(places), places**2, 0.0)
     shape = without(basis, residuals.trace.condensed.cleared(squared) / growth)
     total, square = float(residual @ residual), float(shape @ shape)
-    size = float(shape @ residual) / square
+    # Of a loss modulus alone, nothing.
+    size = float(shape @ residual) / max(square, np.finfo(float).tiny)
     explained = size**2 * square
     known = min(free - 1, residuals.freedom)
     if fdtrc(1, known, explained * (free - 1) / (total - explained)) >= levels.FALSE_ALARM:

@@ -105,7 +105,7 @@ class Instrument:
     @property
     def sweeps(self) -> bool:
         """True if frequencies are swept; else readings follow one another in time."""
-        return bool(self.partners)
+        return self.kind == "oscillation"
 
     @property
     def has_jaws(self) -> bool:
@@ -152,7 +152,8 @@ RELATIVE_MODULUS = Channel("relative_modulus", "", {"1": 1.0, "%": 1e-2}, "relat
 _STIFFNESSES = {"N/m": 1.0, "mN/m": 1e-3, "N/mm": 1e3, "nN/um": 1e-3, "pN/um": 1e-6, "pN/nm": 1e-3}
 PHASE = Channel("phase", "rad", {"rad": 1.0, "mrad": 1e-3, "deg": pi / 180})
 LOSS_FACTOR = Channel("loss_factor", "", {"1": 1.0, "%": 1e-2})
-_LOSSES = Channel("loss", "Pa", STRESS_UNITS), PHASE, LOSS_FACTOR
+LOSS = Channel("loss", "Pa", STRESS_UNITS)
+_LOSSES = LOSS, PHASE, LOSS_FACTOR
 _STIFF_LOSSES = Channel("loss", "N/m", _STIFFNESSES), PHASE, LOSS_FACTOR
 _MODULI = [Channel(name, "Pa", STRESS_UNITS) for name in ("storage", "complex_modulus")]
 VISCOSITY = Channel(
@@ -163,6 +164,7 @@ VISCOSITY = Channel(
 _STIFF = Channel("storage_stiffness", "N/m", _STIFFNESSES)
 
 _READ_BOTH = "In oscillation storage and loss moduli were recorded over frequency"
+_READ_LOSS = "In oscillation loss moduli were recorded over frequency, without storage moduli"
 
 INSTRUMENTS: dict[str, Instrument] = {
     instrument.read.name: instrument
@@ -180,6 +182,8 @@ INSTRUMENTS: dict[str, Instrument] = {
             for of in (*_MODULI, VISCOSITY)
         ),
         Instrument("oscillation", DISPLACEMENT, _STIFF, "N/m", True, _STIFF_LOSSES, _READ_BOTH),
+        # Where no other is named: else it is a partner.
+        Instrument("oscillation", STRAIN, LOSS, "Pa", True, (), _READ_LOSS),
     )
 }
 """Instruments by the name of the quantity that they read."""

@@ -2,10 +2,12 @@
 
 Rows at the same time or frequency are repeats, which may be averaged, if they differ by no more
 than the noise: by an F test of their scatter about their means against that of the means about the
-line between both neighbours. Else a column that tells them apart says of what they are.
+line between both neighbours; and, as a coarse sweep is bent between these, by Student's test of the
+differences between first and last row of each frequency, of which noise has no mean. Else a column
+that tells them apart says of what they are.
 """
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from itertools import combinations
 
@@ -20,28 +22,46 @@ FEWEST_ROWS = 3
 """Fewest rows of a condition."""
 
 
-def are_repeats(places: Array, readings: Array) -> bool:
-    """Return True if rows of equal places differ by no more than noise.
+def how_they_differ(places: Array, readings: Array, *, sweeps: bool) -> str:
+    """Return by how much rows of equal places differ, if that is more than noise; else nothing.
 
-    Places, times or the logarithms of frequencies, are (n_rows,), readings (n_rows, n_columns).
-    Where nothing tells the noise, they are repeats.
+    Places, times or the logarithms of frequencies, are (n_rows,), readings (n_rows, n_columns), in
+    the order of the file. Where nothing tells the noise, they are repeats. Rows of one time may
+    differ between first and last, as where a rounded clock writes the course of a second.
     """
-    sizes = np.log(readings) if np.all(readings > 0) else readings
-    middle, group, counts = np.unique(places, return_inverse=True, return_counts=True)
+    peaks = np.maximum(np.max(np.abs(readings), axis=0), np.finfo(float).tiny)
+    sizes = np.log(readings) if np.all(readings > 0) else readings / peaks
+    middle, first, group, counts = np.unique(
+        places, return_index=True, return_inverse=True, return_counts=True
+    )
+    last = len(places) - 1 - np.unique(places[::-1], return_index=True)[1]
     more, free = len(places) - len(middle), (len(middle) - 2) // 2
-    if free < 1 or not more:
-        return True
-    means = np.array([np.bincount(group, column) / counts for column in sizes.T])
-    within = np.sum((sizes.T - means[:, group]) ** 2, axis=1) / more
-    later = (middle[1:-1] - middle[:-2]) / (middle[2:] - middle[:-2])
-    bent = means[:, 1:-1] - (1 - later) * means[:, :-2] - later * means[:, 2:]
-    of_noise = 1 / counts[1:-1] + (1 - later) ** 2 / counts[:-2] + later**2 / counts[2:]
-    about_lines = np.mean(bent**2 / of_noise, axis=1)
+    steps = (sizes[last] - sizes[first])[counts > 1]
+    # Of each test degrees of freedom, and for each column a size and the noise.
+    tests = list[tuple[int, int, Array, Array]]()
+    if free > 0 and more:
+        means = np.array([np.bincount(group, column) / counts for column in sizes.T])
+        within = np.sum((sizes.T - means[:, group]) ** 2, axis=1) / more
+        later = (middle[1:-1] - middle[:-2]) / (middle[2:] - middle[:-2])
+        bent = means[:, 1:-1] - (1 - later) * means[:, :-2] - later * means[:, 2:]
+        of_noise = 1 / counts[1:-1] + (1 - later) ** 2 / counts[:-2] + later**2 / counts[2:]
+        tests.append((more, free, within, np.mean(bent**2 / of_noise, axis=1)))
+    if sweeps and len(steps) > 1:
+        square = len(steps) * np.mean(steps, axis=0) ** 2 / 2
+        tests.append((1, len(steps) - 1, square, np.var(steps, axis=0, ddof=1) / 2))
     # Imported here: it takes longer than many a job, and few files have rows of several conditions.
     from scipy.special import fdtrc
 
-    chances = fdtrc(more, free, within / np.maximum(about_lines, np.finfo(float).tiny))
-    return bool(np.all(chances > levels.CONDITIONS / len(chances)))
+    for one, other, square, noise in tests:
+        ratio = square / np.maximum(noise, np.finfo(float).tiny)
+        if np.any(fdtrc(one, other, ratio) <= levels.CONDITIONS / (len(tests) * sizes.shape[1])):
+            worst = int(np.argmax(ratio))
+            apart, scatter = (
+                plain(100 * float(np.sqrt(it[worst])), 2)
+                for it in (np.mean(steps**2, axis=0), noise)
+            )
+            return f"differ by {apart} % from the first to the last row, by noise of {scatter} %"
+    return ""
 
 
 def tells_apart(places: Array, others: Mapping[str, Sequence[str]]) -> dict[str, list[str]]:
@@ -62,29 +82,47 @@ def tells_apart(places: Array, others: Mapping[str, Sequence[str]]) -> dict[str,
     return {}
 
 
-def is_like(cell: str, wanted: float | str) -> bool:
-    """Return True if a cell has the number that is wanted, or a measured one scattered about it.
+def alike(cells: Sequence[str], wanted: float | str) -> set[str]:
+    """Return the cells that have what is wanted, or measured numbers scattered about it.
 
-    Whole numbers, as of samples, do not scatter.
+    Whole numbers, as of samples, do not scatter, nor do numbers that come again and again.
     """
     if isinstance(wanted, str):
-        return cell == wanted
-    number = _number_in(cell)
+        return {*cells} & {wanted}
+    again, groups = len({*cells}) <= len(cells) // FEWEST_ROWS, defaultdict[str, set[str]](set)
+    for cell, mean in zip(cells, cells if again else _measured(cells), strict=True):
+        groups[mean].add(cell)
+    found = set[str]()
+    for group in groups.values():
+        numbers = [*map(_number_in, group)]
+        between = min(numbers) <= wanted <= max(numbers)
+        if between or str(wanted) in group or any(_is_near(it, wanted) for it in numbers):
+            found |= group
+    return found
+
+
+def _is_near(number: float, wanted: float) -> bool:
     near = abs(number - wanted) <= levels.MEASURED_ALIKE * abs(wanted)
-    return cell == str(wanted) or number == wanted or (near and not number.is_integer())
+    return near and not number.is_integer()
 
 
 def _measured(cells: Sequence[str]) -> list[str]:
-    """Return cells; of numbers so close that they scatter about one, their mean."""
+    """Return cells; of numbers that scatter about a few, far less than these differ, those few."""
     numbers = np.array([*map(_number_in, cells)])
     if not np.all(np.isfinite(numbers)) or np.all(numbers == np.rint(numbers)):
         return [*cells]
     values, place = np.unique(numbers, return_inverse=True)
-    group = np.append(0, np.cumsum(np.diff(values) > levels.MEASURED_ALIKE * np.abs(values[1:])))[
-        place
-    ]
-    means = np.bincount(group, numbers) / np.bincount(group)
-    return [plain(mean) for mean in means[group]]
+    sizes = np.maximum(np.abs(values[1:]), np.abs(values[:-1]))
+    gaps = np.diff(values) / sizes
+    for cut in np.sort(gaps)[::-1][: len(cells) // FEWEST_ROWS]:
+        apart = gaps >= cut
+        group = np.append(0, np.cumsum(apart))
+        spread = np.bincount(group[1:], np.where(apart, 0, gaps)).max()
+        counts = np.bincount(group[place])
+        if cut > levels.APART * spread and counts.min() >= FEWEST_ROWS:
+            means = np.bincount(group[place], numbers) / counts
+            return [plain(mean) for mean in means[group[place]]]
+    return [*cells]
 
 
 def _number_in(cell: str) -> float:

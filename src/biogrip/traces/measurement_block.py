@@ -15,6 +15,7 @@ from biogrip.keys import BY_KIND, Block, Complaint, Distinct, OneOf
 from biogrip.physics.instruments import (
     INCOMPRESSIBLE,
     INSTRUMENTS,
+    LOSS,
     PARTNERS,
     ROTATION,
     STRAIN,
@@ -105,7 +106,8 @@ class MeasurementBlock(Block):
     frequency: _Name = None
     """Name of the column of frequencies of a sweep, in any order."""
     loss: _Name = None
-    """Name of the column of loss moduli; a sweep has this, `phase` or `loss_factor`."""
+    """Name of the column of loss moduli; a sweep has this, `phase` or `loss_factor`, or this alone,
+    of which nothing tells springs that do not relax."""
     phase: _Name = None
     """Name of the column of phases between strain and stress."""
     loss_factor: _Name = None
@@ -264,6 +266,13 @@ class MeasurementBlock(Block):
         """Return the options of the command that say keys, for messages."""
         return " and ".join(map(_option, keys))
 
+    @property
+    def deepened(self) -> str:
+        """What makes a tip's load positive in contact, for messages."""
+        if self.load_scale is None:
+            return f"turn it by {self.said_by('load_scale')}"
+        return "its zero is where the tip touches, as of a height less that of the contact"
+
     def unit_key(self, key: str) -> str:
         """Return the key that says the unit of a column of `named`."""
         if key in (self.axis, "load"):
@@ -275,7 +284,9 @@ class MeasurementBlock(Block):
     @property
     def readings(self) -> list[str]:
         """Quantities whose columns are named; of a valid recorded trace, one."""
-        return [name for name in READINGS if getattr(self, name) is not None]
+        named = [name for name in READINGS if getattr(self, name) is not None]
+        # Beside another modulus, a loss modulus is its partner.
+        return [name for name in named if name != LOSS.name] or named
 
     @property
     def along(self) -> dict[str, bool]:
@@ -321,11 +332,15 @@ class MeasurementBlock(Block):
             found = " and ".join(sorted(partners)) or "none"
             text = f"goes with one of {', '.join(PARTNERS)}; found {found}"
             yield (self.readings[0],), f"{text}. Say which, as in --reading loss=COLUMN."
+        if self.coloured:
+            yield ("noise_model",), "found coloured, allowed with a frequency sweep is white."
+        if self.readings == [LOSS.name]:
+            for key in sorted(given & {"loss_sd", "phase_sd_rad"}):
+                yield (key,), "is of both moduli, and only the loss modulus is read; leave it out."
+            return
         alone = len(given & {"sd", "loss_sd"}) == 1 or ("sd" in given and "loss" not in given)
         if alone or {"sd", "complex_viscosity"} <= given:
             yield ("sd",), "of a sweep goes with loss and loss_sd: both moduli need deviations."
-        if self.coloured:
-            yield ("noise_model",), "found coloured, allowed with a frequency sweep is white."
 
     def _reading_complaints(self) -> Iterator[Complaint]:
         if not self.readings:

@@ -41,6 +41,7 @@ _DECIMAL = {".": "point", ",": "comma"}
 # What `Recording.remarks` says of parts of its form.
 _REMARKS = {
     "averaged": "Averaged at repeated {axis}: {}.",
+    "repeats": "Rows that were averaged {}: they are no repeats.",
     "outside": "Left out by from_s and until_s: {}.",
     "others": "Left out, for rows asks for others: {}.",
     "unclear": "The {decimal} of {} is read as a decimal mark; where it is between thousands, "
@@ -188,7 +189,9 @@ def read_recording(path: Path, columns: MeasurementBlock) -> Recording:
     parts = [_read_block(path, sheet, tables[place], columns) for place in places]
     values, lines, units, form, remarks = _joined_blocks(columns, parts)
     load, chosen = None, np.concatenate([part.chosen for part in parts])
-    _check_conditions(path, columns, values[chosen], lines[chosen], sheet, tables[places[0]])
+    differ = _check_conditions(
+        path, columns, values[chosen], lines[chosen], sheet, tables[places[0]]
+    )
     if columns.load is not None:
         history, values = values[:, [0, -1]], values[:, :-1]
         numbers = ~np.any(np.isnan(history), axis=1)
@@ -216,6 +219,7 @@ def read_recording(path: Path, columns: MeasurementBlock) -> Recording:
         "rows": len(values),
         **recording.form,
         "others": int(np.count_nonzero(~chosen)) or None,
+        "repeats": differ or None,
         **(_signs_of_a_cut(sheet, tables[-1]) if max(places) + 1 == len(tables) else {}),
     }
     form = {key: value for key, value in form.items() if value is not None}
@@ -351,11 +355,12 @@ def _checked(
                 f"{place(path, lines[row], column)}: found {values[row, index]:.15g}, allowed is a "
                 "standard deviation above 0."
             )
-    if columns.partner:
+    sweeps = columns.instrument.sweeps
+    if sweeps:
         ascending = np.argsort(values[:, 0], kind="stable")
         values, lines = values[ascending], lines[ascending]
     in_si = AXES[columns.axis][units[0]]
-    clock = values[:, 0] * (1.0 if columns.partner else in_si)
+    clock = values[:, 0] * (1.0 if sweeps else in_si)
     used = clock >= (-np.inf if columns.from_s is None else columns.from_s)
     used &= clock <= (np.inf if columns.until_s is None else columns.until_s)
     values, lines, averaged = values[used], lines[used], 0
@@ -365,7 +370,7 @@ def _checked(
     _check_order(path, columns, values[:, 0], lines)
     time_s = values[:, 0] * in_si
     quantity, scale = columns.instrument.read, columns.scale or 1.0
-    end = "rad_per_s" if columns.partner else "s"
+    end = "rad_per_s" if sweeps else "s"
     form = {
         "gaps": without_number,
         "averaged": averaged or None,
@@ -377,11 +382,17 @@ def _checked(
     unit = quantity.units[units[1]] * scale
     if columns.sd is not None:
         sd = values[:, 2] * abs(unit) * quantity.slope(values[:, 1] * unit)
+    for row in np.flatnonzero(values[:, 0] <= 0)[:1] if sweeps else ():
+        found = f"found a frequency of {values[row, 0]:.3g}; allowed is one above 0"
+        raise BiogripError(f"{place(path, lines[row])}: {found}.")
     if columns.partner:
-        moduli = _both_moduli(path, columns, units, values, lines)
+        moduli = _both_moduli(columns, units, values)
         sd = None if sd is None else joined(time_s, *(abs(unit) * values[:, 3:].T))[1]
         time_s, readings = joined(time_s, *moduli)
         lines = np.append(lines[::-1], lines)
+    elif sweeps:
+        time_s, readings, lines = -time_s[::-1], readings[::-1], lines[::-1]
+        sd = None if sd is None else sd[::-1]
     form = {key: value for key, value in form.items() if value is not None}
     of_file = path, columns, (units[0], units[1])
     return Recording(time_s, readings, lines, *of_file, sd=sd, gaps=without_number, form=form)
@@ -396,15 +407,10 @@ def _no_column(
     return f"{place(path, line)}: there is no column '{visible(column)}'. {there}"
 
 
-def _both_moduli(
-    path: Path | None, columns: MeasurementBlock, units: list[str], values: Array, lines: IntArray
-) -> tuple[Array, Array]:
+def _both_moduli(columns: MeasurementBlock, units: list[str], values: Array) -> tuple[Array, Array]:
     """Return storage and loss moduli of a sweep, (n_rows,) in SI units."""
     partner, read, scale = columns.partner, columns.instrument.read, columns.scale or 1.0
     assert partner is not None
-    for row in np.flatnonzero(values[:, 0] <= 0)[:1]:
-        found = f"found a frequency of {values[row, 0]:.3g}; allowed is one above 0"
-        raise BiogripError(f"{place(path, lines[row])}: {found}.")
     first = values[:, 1] * (read.units[units[1]] * scale)
     if read is VISCOSITY:
         first = first * values[:, 0] * AXES[columns.axis][units[0]]
@@ -536,7 +542,7 @@ def _chosen(path: Path, sheet: Sheet, table: Table, columns: MeasurementBlock) -
     if not columns.rows:
         return chosen
     # Imported here, as below: most traces are of one condition.
-    from biogrip.traces.conditions import is_like
+    from biogrip.traces.conditions import alike
 
     line = int(sheet.numbers[table.at]) or None
     for column, wanted in columns.rows.items():
@@ -544,8 +550,7 @@ def _chosen(path: Path, sheet: Sheet, table: Table, columns: MeasurementBlock) -
             raise BiogripError(_no_column(path, line, column, table.names))
         cells = [str(cell) for cell in sheet.cells[table.first : table.end, same[0]]]
         values = [*dict.fromkeys(cells)]
-        fits = {cell for cell in values if is_like(cell, wanted)}
-        if not fits:
+        if not (fits := alike(cells, wanted)):
             text = f"found no row with '{wanted}', allowed are {listed(values, 10)}."
             raise BiogripError(f"{place(path, line, column)}: {text}{nearest(wanted, values)}")
         chosen &= [cell in fits for cell in cells]
@@ -559,19 +564,23 @@ def _check_conditions(
     lines: IntArray,
     sheet: Sheet,
     table: Table,
-) -> None:
-    """Refuse rows of several conditions; the message names the column that tells them apart."""
+) -> str:
+    """Refuse rows of several conditions; the message names the column that tells them apart.
+
+    Return how rows differ that are averaged, if by more than noise.
+    """
     numbers = ~np.any(np.isnan(values), axis=1)
     places, lines = values[numbers, 0], lines[numbers]
     falls = columns.axis == "time" and bool(np.any(np.diff(places) < 0))
     if not falls and len(np.unique(places)) == len(places):
-        return
-    from biogrip.traces.conditions import are_repeats, tells_apart
+        return ""
+    from biogrip.traces.conditions import how_they_differ, tells_apart
 
     sweeps = columns.axis == "frequency"
     scale = np.log(places) if sweeps and np.all(places > 0) else places
-    if not falls and are_repeats(scale, values[numbers, 1:]):
-        return
+    differ = how_they_differ(scale, values[numbers, 1:], sweeps=sweeps)
+    if not (falls or differ):
+        return ""
     read = {index for name in columns.named.values() for index in table.indices(name)}
     rows = sheet.cells[np.searchsorted(sheet.numbers, lines)]
     others = {n: rows[:, i].tolist() for i, n in enumerate(table.names) if n and i not in read}
@@ -582,10 +591,10 @@ def _check_conditions(
         ways = (f"--rows {quote(f'{name}={values[0]}')}" for name, values in condition.items())
         way = f"as by {' '.join(ways)}"
     elif sweeps and not columns.average_repeated:
-        said = "with moduli that differ by more than noise, as of several conditions"
+        said = f"with moduli that {differ}, as of several conditions"
         way = "in a file of their own or with a column that tells them apart"
     else:
-        return
+        return differ
     raise BiogripError(
         f"{place(path)}: found {_PLURALS[columns.axis]} again and again, {said}; allowed are rows "
         f"of one condition, {way}."
@@ -605,7 +614,7 @@ def _load(
     if columns.has_tip and not np.any(sizes > 0):
         raise BiogripError(
             f"{place(path, lines[0], columns.load)}: found nothing above zero, allowed is a "
-            f"depth or a force of a tip in contact: turn it by {columns.said_by('load_scale')}."
+            f"depth or a force of a tip in contact: {columns.deepened}."
         )
     # Before its contact a tip does not press; where it touches may be fitted.
     pressed = columns.has_tip and columns.tip_power is None

@@ -66,6 +66,8 @@ _GAPS = ("", "-", "na", "n/a", "#n/a", "#nv")
 _NUMERIC = re.compile(r"[-+]?\d[-+\d.,:;'\u2019\sTZeE]*|[-+]?[.,]\d[\deE+-]*")
 # What a spreadsheet writes of a failed formula.
 _FAILED_FORMULA = re.compile(r"#[A-Z]")
+# What is above the name of a step, above the names of its columns.
+_STEP = "[step]"
 _MOST_HEADER_ROWS = 5
 _PREAMBLE_LINES_SHOWN = 3
 _NAMES_SHOWN = 8
@@ -309,13 +311,23 @@ def _width(lines: Mapping[int, str], separator: str) -> int:
 
 
 def _cells_of(line: str, separator: str, width: int = 0) -> list[str]:
-    """Return the cells of a line; words with single blanks are one if there are then as many."""
+    """Return the cells of a line; words with single blanks are one if there are then as many.
+
+    Tabs part cells, which may be empty, where no blanks do.
+    """
     if separator != BLANKS:
         return line.split(separator)
+    tabbed = line.split("\t")
+    if len(tabbed) > 1 and (len(tabbed) == width or max(map(_count_words, tabbed)) < 2):
+        return tabbed
     if _OTHERWISE.search(line):
         return [line]
     wide = _WIDE_GAP.split(line.strip())
     return wide if len(wide) == width else _CELL.findall(line)
+
+
+def _count_words(cell: str) -> int:
+    return len(_CELL.findall(cell))
 
 
 def _names(cells: Sequence[str]) -> set[str]:
@@ -323,7 +335,12 @@ def _names(cells: Sequence[str]) -> set[str]:
 
 
 def _separator(lines: Sequence[str], headers: Sequence[str], wanted: set[str]) -> tuple[str, int]:
-    """Return what parts most wanted names in a header, or the cells of most lines; and how many."""
+    """Return what parts most wanted names in a header, or the cells of most rows; and how many.
+
+    Where no line is a row of numbers, all lines count: else words of a preamble would.
+    """
+    searched = lines[:_LINES_SEARCHED]
+    searched = [line for line in searched if _ROW.match(line + " ")] or searched
 
     def merit(separator: str) -> tuple[int, int]:
         common = 0
@@ -331,7 +348,7 @@ def _separator(lines: Sequence[str], headers: Sequence[str], wanted: set[str]) -
             wide = _WIDE_GAP.split(row.strip()) if separator == BLANKS else []
             of = (len(wanted & _names(cells)) for cells in (_cells_of(row, separator), wide))
             common = max(common, *of)
-        parted = (len(_cells_of(line, separator)) > 1 for line in lines[:_LINES_SEARCHED])
+        parted = (len(_cells_of(line, separator)) > 1 for line in searched)
         return common, sum(parted)
 
     # Where as many lines have commas as tabs or semicolons, these are decimal commas.
@@ -393,6 +410,7 @@ def _tables(sheet: Sheet, columns: MeasurementBlock) -> list[Table]:
     return [
         replace(table, end=max(end, table.first), title=_title(sheet, start, table))
         for table, (start, end) in zip(tables, pairwise(ends), strict=False)
+        if end > table.first or table.common(columns) == len(columns.named)
     ]
 
 
@@ -410,7 +428,7 @@ def _header(sheet: Sheet, at: int, columns: MeasurementBlock) -> Table | None:
     A header has the columns to read, or is above a row of units in brackets and rows of numbers,
     or follows ``[step]`` and the name of a step.
     """
-    is_step = at >= 2 and str(sheet.cells[at - 2, 0]).lower() == "[step]"
+    is_step = at >= 2 and str(sheet.cells[at - 2, 0]).lower() == _STEP
     table = Table(at, sheet.cells[at, : sheet.widths[at]].tolist(), at + 1, is_step=is_step)
     if table.common(columns) == len(columns.named):
         return _with_header_rows(sheet, table, columns)
@@ -420,6 +438,8 @@ def _header(sheet: Sheet, at: int, columns: MeasurementBlock) -> Table | None:
     most = min(at + 1 + _MOST_HEADER_ROWS, len(sheet.cells))
     below = [row for row in range(at + 1, most) if any(sheet.cells[row])]
     if len(below) < 2 or any(sheet.cells[below[0], len(table.names) :]):
+        return None
+    if str(sheet.cells[below[0], 0]).lower() == _STEP:
         return None
     units = sheet.cells[below[0], : len(table.names)].tolist()
     numbers = [_count_numbers(sheet.cells[row]) for row in below[1:]]
