@@ -213,6 +213,7 @@ KINDS = {
         *(
             "--block 1",
             "--block 1,2",
+            "identify the first alone: --block ",
             "is one, as by --block 1,",
             "--rows ",
             "--set measurement.",

@@ -224,3 +224,36 @@ def test_a_sample_that_moved_before_the_first_row_is_doubted(tmp_path: Path) -> 
     assert by_quantity(found)["k_p"]["low"] > K_P
     told = by_quantity(identified(tmp_path, moved, *given, "--from", "12"))["k_p"]
     assert (told["low"] or 0) < K_P < (told["high"] or np.inf)
+
+
+@pytest.mark.parametrize("zeroed", [False, True])
+def test_readings_that_begin_anew_in_a_later_block_are_named(
+    tmp_path: Path, *, zeroed: bool
+) -> None:
+    """Creep of 1/1200 at once and 1/800 with 20 s, then recovery, zeroed or not."""
+
+    def compliance(time_s: Array) -> Array:
+        return (time_s >= 0) * (1 / 1200 - np.expm1(-np.maximum(time_s, 0) / 20) / 800)
+
+    creep_s, recovery_s = np.arange(1.0, 121.0) * 0.5, np.arange(1.0, 181.0)
+    crept = 50 * compliance(creep_s) + noise(120, 2e-4)
+    recovered = 50 * (compliance(60 + recovery_s) - compliance(recovery_s)) + noise(180, 2e-4)
+    both = (creep_s, crept, 50), (recovery_s, recovered - zeroed * crept[-1], 0)
+    trace = tmp_path / "blocks.csv"
+    with trace.open("w") as file:
+        for times, strain, load in both:
+            table = np.column_stack((times, strain, np.full(len(times), load)))
+            np.savetxt(file, table, delimiter=",", header="time_s,strain,load_Pa", comments="")
+    given = ("--reading", "strain", "--load", "load_Pa", "--model", "zener_kelvin", "--no-compare")
+    found = identified(tmp_path, trace, *given, "--block", "1,2")
+    offset = identified(tmp_path, trace, *given, "--block", "1,2", "--offset")
+    if not zeroed:
+        assert found["fit"] == "ok", found["reasons"]
+        assert not any("seem to begin anew" in note["text"] for note in offset["notes"])
+        return
+    assert found["fit"] == "rejected"
+    for doubted in (found, offset):
+        (said,) = (it for it in doubted["reasons"] if "begin anew at 60 s:" in it)
+        (block,) = re.findall(r"the first alone: --block (\d)\.", said)
+        assert "--offset" not in " ".join(doubted["reasons"])
+    holds(identified(tmp_path, trace, *given, "--block", block), k_s=1200.0, k_v=800.0)
