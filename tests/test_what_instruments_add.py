@@ -257,3 +257,20 @@ def test_readings_that_begin_anew_in_a_later_block_are_named(
         (block,) = re.findall(r"the first alone: --block (\d)\.", said)
         assert "--offset" not in " ".join(doubted["reasons"])
     holds(identified(tmp_path, trace, *given, "--block", block), k_s=1200.0, k_v=800.0)
+
+
+@pytest.mark.parametrize("offset_Pa", [0.4, 1.0, -0.5])
+def test_a_tare_and_an_offset_at_once_are_told_by_rows_before(
+    tmp_path: Path, offset_Pa: float
+) -> None:
+    """0.2 % for 5 s, which the sample does not feel, then 5 % more: k_p would be 3 % too large."""
+    time_s = np.linspace(0.0, 64.9, 650)
+    strain = np.repeat([0.002, 0.052], [50, 600])
+    stress = np.append(np.zeros(50), 0.05 * modulus(time_s[50:] - 4.95))
+    read = stress + offset_Pa + noise(650, 0.05)
+    trace = write_trace(tmp_path / "tare.csv", time_s, read, strain, header="time_s,s_Pa,strain")
+    given = ("--reading", "stress=s_Pa", "--load", "strain", *RELAXATION[:3])
+    for more in ([], ["--offset"]):
+        found = identified(tmp_path, trace, *given, *more)
+        assert found["fit"] == "ok", found["reasons"]
+        holds(found, k=K, k_p=K_P, tau=TAU_S)
