@@ -213,7 +213,7 @@ KINDS = {
         *(
             "--block 1",
             "--block 1,2",
-            "identify the first alone: --block ",
+            " Add to each what was zeroed, or identify",
             "is one, as by --block 1,",
             "--rows ",
             "--set measurement.",
