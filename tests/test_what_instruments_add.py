@@ -274,3 +274,27 @@ def test_a_tare_and_an_offset_at_once_are_told_by_rows_before(
         found = identified(tmp_path, trace, *given, *more)
         assert found["fit"] == "ok", found["reasons"]
         holds(found, k=K, k_p=K_P, tau=TAU_S)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_one_modulus_far_off_in_a_sweep_is_named(tmp_path: Path, *, turned: bool) -> None:
+    """A tenth of a storage modulus, or 8 degrees more of a phase; in 2 %, and in 0.3 degrees."""
+    omega = np.logspace(-1, 2, 25)
+    whole = K_P + 3 * K * 0.5j * omega / (1 + 0.5j * omega) + 0.5j * omega
+    size = np.abs(whole) * (1 + noise(25, 0.02))
+    phase = np.angle(whole) + 0.005 * np.random.default_rng(7).standard_normal(25)
+    phase[12] += turned * np.radians(8)
+    storage, loss = size * np.cos(phase), size * np.sin(phase)
+    storage[0] *= 1.0 if turned else 0.1
+    columns, names = (storage, loss), ("storage", "loss")
+    if turned:
+        columns, names = (size, np.degrees(phase)), ("complex_modulus", "phase")
+    header = f"w (rad/s),{names[0]}_Pa,{names[1]}_{'deg' if turned else 'Pa'}"
+    trace = write_trace(tmp_path / "sweep.csv", omega, *columns, header=header)
+    read = zip(names, header.split(",")[1:], strict=True)
+    options = [it for pair in read for it in ("--reading", "=".join(pair))]
+    given = ("--frequency", "w (rad/s)", "--model", "zener_maxwell", "--no-compare")
+    found = identified(tmp_path, trace, *options, *given)
+    assert found["fit"] == "rejected"
+    place = f"{omega[12]:.4g} rad/s (loss)" if turned else f"{omega[0]:.4g} rad/s (storage)"
+    assert f"single readings are far off, the furthest at {place}, as" in found["reasons"][0]
