@@ -136,7 +136,7 @@ def _notes_on_trace(judged: Diagnosis, on_fit: list[Note], opinion: list[Note]) 
     yield from on_fit
     if experiment.instrument.sweeps:
         return
-    yield from notes_on_gains(judged.likelihood, judged.notes)
+    yield from (gains := [*notes_on_gains(judged.likelihood, judged.notes)])
     start: list[Note] = []
     if recording.read.has_tip:
         # Imported here: most traces are of no tip.
@@ -146,8 +146,8 @@ def _notes_on_trace(judged: Diagnosis, on_fit: list[Note], opinion: list[Note]) 
     start = start or [*_notes_on_blocks(judged)] or notes_on_start(recording, experiment, judged)
     yield from start
     rounded = any(note.about == doubts.ROUNDED and note.weight == DOUBT for note in judged.notes)
-    # Beside another start, or errors of rounding, an offset and a drift mean nothing.
-    if not rounded and all(note.weight == HARMLESS for note in start):
+    # Beside another start, errors of rounding or gains an offset and a drift mean nothing.
+    if not (rounded or gains) and all(note.weight == HARMLESS for note in start):
         yield from opinion
     yield from _note_flow(recording, experiment)
     if not rounded:
