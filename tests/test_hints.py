@@ -212,6 +212,7 @@ KINDS = {
     "typed here": (
         *(
             "--block 1,2",
+            " Add to each what was zeroed, or identify",
             "is one, as by --block 1,",
             "--rows ",
             "--set measurement.",

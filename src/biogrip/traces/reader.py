@@ -103,6 +103,8 @@ class Recording:
     load: Array | None = None
     """Times and loads, or deformations, in SI units, (n, 2), where they are read: of all rows, used
     or not."""
+    later_blocks: tuple[int, ...] = ()
+    """First line of each block that was joined to the first."""
 
     def part(self, kept: BoolArray) -> "Recording":
         """Return some of the readings, (n_samples,) true for those."""
@@ -225,7 +227,8 @@ def read_recording(path: Path, columns: MeasurementBlock) -> Recording:
     form = {key: value for key, value in form.items() if value is not None}
     if load is None and not columns.instrument.has_jaws and len(parts) == 1:
         remarks += tuple(_about_rise(sheet, table, parts[0], columns))
-    return replace(recording, form=form, load=load, remarks_before=remarks)
+    later = tuple(int(line) for part in parts[1:] for line in part.lines[:1])
+    return replace(recording, form=form, load=load, remarks_before=remarks, later_blocks=later)
 
 
 @dataclass(frozen=True)
