@@ -22,8 +22,8 @@ PUBLISHED = ROOT / "results" / "published"
 BENCHMARKS = ROOT / "benchmarks" / "results" / "benchmarks.json"
 
 _NUMBER = re.compile(
-    r"(<!--= *(?P<table>\w+)(\[(?P<rows>[^\]]*)\])?\.(?P<column>[\w.]+) *\\?\| *(?P<how>[^ |\\]+?)"
-    r" *(\\?\| *(?P<each>each) *)?-->)[^<]*(<!--/-->)"
+    r"(<!--= *(?P<table>[\w/]+)(\[(?P<rows>[^\]]*)\])?\.(?P<column>[\w.]+)"
+    r" *\\?\| *(?P<how>[^ |\\]+?) *(\\?\| *(?P<each>each) *)?-->)[^<]*(<!--/-->)"
 )
 
 
@@ -62,8 +62,9 @@ def _formatted(value: float, how: str) -> str:
 
 
 def _table(table: str) -> pd.DataFrame:
-    # Of tables that overlays have as well, that of the default study is meant.
-    default = PUBLISHED / "tables" / f"{table}.csv"
+    # Of tables that overlays have as well, that of the default study is meant, or OVERLAY/TABLE.
+    overlay, _, table = table.rpartition("/")
+    default = PUBLISHED / overlay / "tables" / f"{table}.csv"
     for file in (default, *sorted(PUBLISHED.rglob(f"{table}.csv"))):
         if file.is_file():
             return pd.read_csv(file, dtype=str, keep_default_na=False, na_values=[""])

@@ -49,9 +49,10 @@ def set_up_of(text: str = GRIPPER) -> tuple[Limits, list[Specimen]]:
 def test_the_search_knows_the_bounds_of_a_train(text: str) -> None:
     """By central differences. At 0, where a stress starts, nothing is read."""
     limits, specimens = set_up_of(text)
-    train, step, drifts = design.search(specimens, limits, 20)[0], 1e-4, int(text == DRIFTING)
+    ((train,), _), step = design.search(specimens, limits, 20), 1e-4
+    drifts = int(text == DRIFTING)
     for one in specimens:
-        found = design.rated(one, train.phases, limits.rate_Hz)
+        found = design.rated(one, [train.phases], limits.rate_Hz)
         problem = replace(one.case.experiment, phases=train.phases)
         times_s = sample_times(problem.torque.end_s, limits.rate_Hz)[drifts:]
         names, read = problem.searched.names, []
@@ -63,7 +64,7 @@ def test_the_search_knows_the_bounds_of_a_train(text: str) -> None:
         rows = np.vstack((rows, *([line**0 / one.noise, line / one.noise] if drifts else [])))
         expected = np.sqrt(np.diagonal(np.linalg.inv(rows @ rows.T)))[: len(names)]
         assert found.bounds == pytest.approx(expected, rel=1e-4)
-        assert one.told(train)[0] == pytest.approx(found.bounds, rel=1e-9)
+        assert one.told([train])[0] == pytest.approx(found.bounds, rel=1e-9)
         # The jaws press every sample, which they do not under many random trains.
         assert drifts or (found.force_N or 0) > 0
 
@@ -72,12 +73,12 @@ def test_the_search_knows_the_force_of_the_jaws() -> None:
     limits, (_, one) = set_up_of()
     pressed = []
     for unknowns in np.random.default_rng(0).random((30, 2 * limits.steps)):
-        train = design.decode(unknowns, limits)
+        (train,) = design.decode(unknowns, limits)
         torque = replace(one.case.experiment, phases=train.phases).torque
         network = one.case.experiment.searched.network(one.parameters[None])
         grip = compute_grip(one.case.gripper, network, torque)
         pressed.append(grip.lowest_N > 0)
-        share = one.told(train)[1]
+        share = one.told([train])[1]
         assert (share > 0) == pressed[-1] or abs(share) < 0.01
     assert 0.1 < np.mean(pressed) < 0.9
 
@@ -89,7 +90,7 @@ def test_trains_keep_their_limits(rate_Hz: float) -> None:
     text += "only: [endothelial_cell]\ndesign: {steps: 12, largest: 1.0e-9, duration_s: 100.0}"
     limits, _ = set_up_of(text)
     for each in np.random.default_rng(1).random((20, 24)):
-        train = design.decode(each, limits)
+        (train,) = design.decode(each, limits)
         assert np.all((train.levels > 0) & (train.levels <= 1.0e-9 * (1 + 1e-12)))
         # Steps start between readings.
         assert np.all(train.starts[1:] % 2 == 1)
@@ -101,7 +102,7 @@ def test_trains_keep_their_limits(rate_Hz: float) -> None:
 def test_parameters_that_are_told_to_less_than_an_e_fold_or_trade_have_no_bound() -> None:
     """All four of the paper's drop under its own protocol: c and c_p show as their sum alone."""
     _, (one,) = set_up_of("only: [liquid_drop_2]\nmeasurement: {noise: {level_rad: 3.0e-6}}")
-    found = design.rated(one, one.case.phases, one.case.block.measurement.rate_Hz)
+    found = design.rated(one, [one.case.phases], one.case.block.measurement.rate_Hz)
     by_name = dict(zip(one.case.experiment.searched.names, found.bounds, strict=True))
     assert by_name["c"] == by_name["c_p"] == NO_BOUND
     assert by_name["k_p"] < 0.1
@@ -143,6 +144,24 @@ def test_a_design_is_better_and_keeps_its_limits(
     assert {held, "duration_s"} == set(phases[0])
     before = output.read_bytes()
     assert designed(tmp_path, text).read_bytes() == before
+
+
+def test_traces_of_one_sample_are_designed_together(
+    tmp_path: Path, capsys: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One trace twice has half the variance; two trains tell more than one."""
+    monkeypatch.setattr(design, "GENERATIONS", 20)
+    limits, (one,) = set_up_of(STRESS)
+    ((train,), _) = design.search([one], limits, 20)
+    once, twice = one.told([train])[0], one.told([train, train])[0]
+    np.testing.assert_allclose(twice, once / np.sqrt(2), rtol=1e-9)
+    output = designed(tmp_path, STRESS.replace("steps: 3", "steps: 3, traces: 2"))
+    rows = [line.split() for line in capsys.readouterr().out.splitlines() if "bound (%)" in line]
+    assert max(float(row[-1]) for row in rows) < 100 * once.max()
+    first, second = study_of(output.read_text()).cases.values()
+    assert (first.name, second.name) == ("solid_1", "solid_2")
+    assert first.parameters == second.parameters
+    assert len(first.phases) == len(second.phases) == 3
 
 
 def test_what_cannot_be_designed_is_said(tmp_path: Path, capsys: Any) -> None:

@@ -210,7 +210,15 @@ def test_advice_beside_a_result_helps(tmp_path: Path, make: object) -> None:
 
 KINDS = {
     "typed here": (
-        *("--block 1", "--block 1,2", "--rows ", "--set measurement.", "--reading ", "--reading"),
+        *(
+            "--block 1,2",
+            " Add to each what was zeroed, or identify",
+            "is one, as by --block 1,",
+            "--rows ",
+            "--set measurement.",
+            "--reading ",
+            "--reading",
+        ),
         *(", as --reading ", ", as by --reading ", " Which quantity is it? Say so, as by --read"),
         " with --load ",
         *(': say its unit, as in --hold "', " Readings are weighted by --noise-share "),
@@ -218,9 +226,12 @@ KINDS = {
         " s on: what is said holds while it grows or stays. Leave these readings out: --until ",
     ),
     "typed by tests of onsets, contacts and damaged results": (
-        "time that it remembers of that: --from, ",
+        *(
+            " times as wide. If it was moved before, leave",
+            " s after the step of the protocol, as if",
+        ),
         *("--start says when", "). If it does, say --start fit", "say --contact fit"),
-        *(" came. Say when the protocol started (--start", "It is damaged: the same command with"),
+        "It is damaged: the same command with",
     ),
     "names an option whose value only its reader knows": (
         *(" rad, or less with a given noise (--noise) ", ", or it is below the noise: say how"),

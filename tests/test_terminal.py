@@ -105,7 +105,7 @@ def test_examples_are_commands_that_can_be_typed(
     with pytest.raises(SystemExit):
         main([command, "--help"])
     _, _, examples = capsys.readouterr().out.partition("\nexamples:\n")
-    lines = [line for line in examples.splitlines() if line.startswith("  ")]
+    lines = [line for line in examples.partition("\n\n")[0].splitlines() if line.startswith("  ")]
     assert len(lines) >= 2
     for line in lines:
         program, *arguments = shlex.split(line)

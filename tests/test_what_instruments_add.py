@@ -224,3 +224,77 @@ def test_a_sample_that_moved_before_the_first_row_is_doubted(tmp_path: Path) -> 
     assert by_quantity(found)["k_p"]["low"] > K_P
     told = by_quantity(identified(tmp_path, moved, *given, "--from", "12"))["k_p"]
     assert (told["low"] or 0) < K_P < (told["high"] or np.inf)
+
+
+@pytest.mark.parametrize("zeroed", [False, True])
+def test_readings_that_begin_anew_in_a_later_block_are_named(
+    tmp_path: Path, *, zeroed: bool
+) -> None:
+    """Creep of 1/1200 at once and 1/800 with 20 s, then recovery, zeroed or not."""
+
+    def compliance(time_s: Array) -> Array:
+        return (time_s >= 0) * (1 / 1200 - np.expm1(-np.maximum(time_s, 0) / 20) / 800)
+
+    creep_s, recovery_s = np.arange(1.0, 121.0) * 0.5, np.arange(1.0, 181.0)
+    crept = 50 * compliance(creep_s) + noise(120, 2e-4)
+    recovered = 50 * (compliance(60 + recovery_s) - compliance(recovery_s)) + noise(180, 2e-4)
+    both = (creep_s, crept, 50), (recovery_s, recovered - zeroed * crept[-1], 0)
+    trace = tmp_path / "blocks.csv"
+    with trace.open("w") as file:
+        for times, strain, load in both:
+            table = np.column_stack((times, strain, np.full(len(times), load)))
+            np.savetxt(file, table, delimiter=",", header="time_s,strain,load_Pa", comments="")
+    given = ("--reading", "strain", "--load", "load_Pa", "--model", "zener_kelvin", "--no-compare")
+    found = identified(tmp_path, trace, *given, "--block", "1,2")
+    offset = identified(tmp_path, trace, *given, "--block", "1,2", "--offset")
+    if not zeroed:
+        assert found["fit"] == "ok", found["reasons"]
+        assert not any("seem to begin anew" in note["text"] for note in offset["notes"])
+        return
+    assert found["fit"] == "rejected"
+    for doubted in (found, offset):
+        (said,) = (it for it in doubted["reasons"] if "begin anew at 60 s:" in it)
+        (block,) = re.findall(r"the first alone: --block (\d)\.", said)
+        assert "--offset" not in " ".join(doubted["reasons"])
+    holds(identified(tmp_path, trace, *given, "--block", block), k_s=1200.0, k_v=800.0)
+
+
+@pytest.mark.parametrize("offset_Pa", [0.4, 1.0, -0.5])
+def test_a_tare_and_an_offset_at_once_are_told_by_rows_before(
+    tmp_path: Path, offset_Pa: float
+) -> None:
+    """0.2 % for 5 s, which the sample does not feel, then 5 % more: k_p would be 3 % too large."""
+    time_s = np.linspace(0.0, 64.9, 650)
+    strain = np.repeat([0.002, 0.052], [50, 600])
+    stress = np.append(np.zeros(50), 0.05 * modulus(time_s[50:] - 4.95))
+    read = stress + offset_Pa + noise(650, 0.05)
+    trace = write_trace(tmp_path / "tare.csv", time_s, read, strain, header="time_s,s_Pa,strain")
+    given = ("--reading", "stress=s_Pa", "--load", "strain", *RELAXATION[:3])
+    for more in ([], ["--offset"]):
+        found = identified(tmp_path, trace, *given, *more)
+        assert found["fit"] == "ok", found["reasons"]
+        holds(found, k=K, k_p=K_P, tau=TAU_S)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_one_modulus_far_off_in_a_sweep_is_named(tmp_path: Path, *, turned: bool) -> None:
+    """A tenth of a storage modulus, or 8 degrees more of a phase; in 2 %, and in 0.3 degrees."""
+    omega = np.logspace(-1, 2, 25)
+    whole = K_P + 3 * K * 0.5j * omega / (1 + 0.5j * omega) + 0.5j * omega
+    size = np.abs(whole) * (1 + noise(25, 0.02))
+    phase = np.angle(whole) + 0.005 * np.random.default_rng(7).standard_normal(25)
+    phase[12] += turned * np.radians(8)
+    storage, loss = size * np.cos(phase), size * np.sin(phase)
+    storage[0] *= 1.0 if turned else 0.1
+    columns, names = (storage, loss), ("storage", "loss")
+    if turned:
+        columns, names = (size, np.degrees(phase)), ("complex_modulus", "phase")
+    header = f"w (rad/s),{names[0]}_Pa,{names[1]}_{'deg' if turned else 'Pa'}"
+    trace = write_trace(tmp_path / "sweep.csv", omega, *columns, header=header)
+    read = zip(names, header.split(",")[1:], strict=True)
+    options = [it for pair in read for it in ("--reading", "=".join(pair))]
+    given = ("--frequency", "w (rad/s)", "--model", "zener_maxwell", "--no-compare")
+    found = identified(tmp_path, trace, *options, *given)
+    assert found["fit"] == "rejected"
+    place = f"{omega[12]:.4g} rad/s (loss)" if turned else f"{omega[0]:.4g} rad/s (storage)"
+    assert f"single readings are far off, the furthest at {place}, as" in found["reasons"][0]

@@ -66,6 +66,8 @@ class Limits:
     """Rate of the readings."""
     intervals: int
     """Duration, in intervals between readings."""
+    traces: int = 1
+    """Number of trains, each of one trace."""
 
     @property
     def elapsed_s(self) -> Array:
@@ -112,19 +114,23 @@ class Specimen:
     """After a unit step, derivatives of what is read by the log-parameters, and the force of the
     jaws if there are any, at `Limits.elapsed_s`, (n_parameters + 1 or 0, n_times)."""
 
-    def told(self, train: Train) -> tuple[Array, float]:
-        """Return relative bounds under a train, (n_parameters,), and the jaws' least force.
+    def told(self, trains: Sequence[Train]) -> tuple[Array, float]:
+        """Return relative bounds, (n_parameters,), of traces together, and the jaws' least force.
 
         The force is a share of their largest; 1 without jaws.
         """
+        slopes, least = zip(*map(self._under, trains), strict=True)
+        return relative_bounds(np.hstack(slopes), self.noise), min(least)
+
+    def _under(self, train: Train) -> tuple[Array, float]:
+        """Return derivatives of readings under a train, and the jaws' least force."""
         rows = np.zeros_like(self.unit)
         jumps = np.diff(train.levels, prepend=0.0)
         for start, jump in zip(train.starts.tolist(), jumps.tolist(), strict=True):
             rows[:, start:] += jump * self.unit[:, : rows.shape[1] - start]
         slopes, force = np.split(rows, [len(self.required)])
         least = float(force.min() / force.max()) if force.size else 1.0
-        slopes = slopes[:, ::2][:, -self.nuisance.shape[1] :]
-        return relative_bounds(without(self.nuisance, slopes), self.noise), least
+        return without(self.nuisance, slopes[:, ::2][:, -self.nuisance.shape[1] :]), least
 
 
 def relative_bounds(slopes: Array, noise: float) -> Array:
@@ -143,11 +149,11 @@ def relative_bounds(slopes: Array, noise: float) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class RatedProtocol:
-    """Protocol and readings, with what they tell of a sample."""
+class RatedProtocols:
+    """Protocols of a sample's traces, and their readings, with what they tell of it together."""
 
-    phases: tuple[Phase, ...]
-    times_s: Array
+    protocols: Sequence[tuple[Phase, ...]]
+    times_s: Sequence[Array]
     bounds: Array
     """Relative bounds, (n_parameters,); `NO_BOUND` for parameters without one."""
     force_N: float | None
@@ -169,9 +175,12 @@ def design(config: Path, output: Path | None = None) -> None:
         limits, specimens = set_up(cases, block)
     except BiogripError as error:
         raise BiogripError(f"{config}: {error}") from error
-    train, reached = search(specimens, limits)
-    before = [rated(one, one.case.phases, one.case.block.measurement.rate_Hz) for one in specimens]
-    after = [rated(one, train.phases, limits.rate_Hz) for one in specimens]
+    trains, reached = search(specimens, limits)
+    protocols = [train.phases for train in trains]
+    before = [
+        rated(one, [one.case.phases], one.case.block.measurement.rate_Hz) for one in specimens
+    ]
+    after = [rated(one, protocols, limits.rate_Hz) for one in specimens]
     write_text(output, as_config(read_config(config), specimens, after, limits.rate_Hz))
     then = f"snakemake -j2 --configfile {output} simulates and fits it"
     said = [*_said(specimens, before, after, reached), f"Written to {output}; {then}."]
@@ -221,7 +230,8 @@ def set_up(cases: Sequence[SampleCase], block: DesignBlock) -> tuple[Limits, lis
             f"design.duration_s: found {duration_s:g} s, room for {intervals} readings at "
             f"{rate_Hz:g} Hz; allowed are {_FEWEST} to {_MOST}, by another duration_s or rate_Hz."
         )
-    limits = Limits(min(block.steps, intervals // _FEWEST), largest, rate_Hz, intervals)
+    steps = min(block.steps, intervals // _FEWEST)
+    limits = Limits(steps, largest, rate_Hz, intervals, block.traces)
     return limits, [_specimen(case, block, limits) for case in cases]
 
 
@@ -261,8 +271,8 @@ def _specimen(case: SampleCase, block: DesignBlock, limits: Limits) -> Specimen:
 
 def search(
     specimens: Sequence[Specimen], limits: Limits, generations: int = GENERATIONS
-) -> tuple[Train, list[BoolArray]]:
-    """Search for the train with the lowest worst bound of all parameters within reach.
+) -> tuple[list[Train], list[BoolArray]]:
+    """Search for the trains with the lowest worst bound of all parameters within reach.
 
     Such are asked for, and have a bound in one of some hundred random trains: True in an array
     (n_parameters,) for each sample, returned beside the train. If there is none, it is a
@@ -271,7 +281,7 @@ def search(
     # Imported lazily: it is slow to import.
     from scipy.optimize import differential_evolution
 
-    unknowns, rng = 2 * limits.steps, np.random.default_rng(_SEED)
+    unknowns, rng = 2 * limits.steps * limits.traces, np.random.default_rng(_SEED)
     tried = [decode(point, limits) for point in rng.random((_TRIED, unknowns))]
     reached = [
         np.any([one.told(train)[0] < NO_BOUND for train in tried], axis=0) & one.required
@@ -301,12 +311,16 @@ def search(
     return decode(result.x, limits), reached
 
 
-def decode(unknowns: Array, limits: Limits) -> Train:
-    """Return a train within its limits from numbers between 0 and 1, (n_unknowns,).
+def decode(unknowns: Array, limits: Limits) -> list[Train]:
+    """Return trains within their limits from numbers between 0 and 1, (n_unknowns,).
 
-    These are, for each step, its level as a share of the largest, and the logarithm of its
+    These are, for each step of each, its level as a share of the largest, and the logarithm of its
     duration.
     """
+    return [_decoded(of_train, limits) for of_train in np.split(unknowns, limits.traces)]
+
+
+def _decoded(unknowns: Array, limits: Limits) -> Train:
     heights, lengths = np.split(unknowns, 2)
     shares = (_FEWEST / limits.intervals) ** lengths
     room = limits.intervals - _FEWEST * limits.steps
@@ -315,11 +329,24 @@ def decode(unknowns: Array, limits: Limits) -> Train:
     return Train(limits.largest * np.ceil(_FINE * heights) / _FINE, starts, limits)
 
 
-def rated(specimen: Specimen, phases: tuple[Phase, ...], rate_Hz: float) -> RatedProtocol:
-    """Compute what an experiment tells of a sample.
+def rated(
+    specimen: Specimen, protocols: Sequence[tuple[Phase, ...]], rate_Hz: float
+) -> RatedProtocols:
+    """Compute what traces under some protocols tell of a sample together.
 
-    If it turns the arms further than the comb drives can, it is a `BiogripError`.
+    If one turns the arms further than the comb drives can, it is a `BiogripError`.
     """
+    each = [_rated(specimen, phases, rate_Hz) for phases in protocols]
+    times_s, slopes, forces_N = zip(*each, strict=True)
+    bounds = relative_bounds(np.hstack(slopes), specimen.noise)
+    lowest_N = min(forces_N) if specimen.case.instrument.has_jaws else None
+    return RatedProtocols(protocols, times_s, bounds, lowest_N)
+
+
+def _rated(
+    specimen: Specimen, phases: tuple[Phase, ...], rate_Hz: float
+) -> tuple[Array, Array, float]:
+    """Return times of a trace, derivatives of its readings, and the jaws' least force."""
     case, problem = specimen.case, replace(specimen.case.experiment, phases=phases)
     times_s, model = sample_times(problem.torque.end_s, rate_Hz), problem.searched
     if not case.instrument.has_jaws:
@@ -328,43 +355,49 @@ def rated(specimen: Specimen, phases: tuple[Phase, ...], rate_Hz: float) -> Rate
     given = problem.gripper, model, problem.torque, times_s, specimen.parameters[None]
     read, slopes = np.split(linear_responses(*given)[0], [1])
     slopes = without(problem.nuisance(times_s), slopes)
-    bounds = relative_bounds(slopes, specimen.noise)
     if not case.instrument.has_jaws:
-        return RatedProtocol(phases, times_s, bounds, None)
+        return times_s, slopes, np.inf
     if read.max() > case.stroke:
         text = f"found a torque that turns the arms by {1e3 * read.max():.4g} mrad, allowed is "
         text += f"what the stroke leaves, {1e3 * case.stroke:.4g} mrad: a lower `largest`."
         raise BiogripError(f"design: {case.name}: {text}")
     network = model.network(specimen.parameters[None])
-    grip = compute_grip(case.gripper, network, problem.torque)
-    return RatedProtocol(phases, times_s, bounds, grip.lowest_N)
+    return times_s, slopes, compute_grip(case.gripper, network, problem.torque).lowest_N
 
 
 def as_config(
     given: dict[str, Any],
     specimens: Sequence[Specimen],
-    after: Sequence[RatedProtocol],
+    after: Sequence[RatedProtocols],
     rate_Hz: float,
 ) -> str:
-    """Return a config, as YAML, with an experiment as that of its cases."""
+    """Return a config, as YAML, with an experiment as that of its cases.
+
+    Of several traces of a sample each is a case, whose name ends in its number.
+    """
     config = deepcopy(given)
-    cases = config.setdefault("cases", {})
+    cases, several = config.setdefault("cases", {}), len(after[0].protocols) > 1
+    if several:
+        numbers = range(1, len(after[0].protocols) + 1)
+        config["only"] = [f"{one.case.name}_{n}" for one in specimens for n in numbers]
     for one, experiment in zip(specimens, after, strict=True):
         column = one.case.instrument.controlled.column
-        phases = [
-            {"duration_s": phase.duration_s, column: phase.level} for phase in experiment.phases
-        ]
-        measured = {"noise": {"level_rad": one.noise}, "rate_Hz": rate_Hz}
-        designed = {"protocol": {"phases": phases}, "measurement": measured}
-        cases[one.case.name] = overlaid(cases.get(one.case.name) or {}, designed)
+        for number, protocol in enumerate(experiment.protocols, 1):
+            phases = [{"duration_s": phase.duration_s, column: phase.level} for phase in protocol]
+            measured = {"noise": {"level_rad": one.noise}, "rate_Hz": rate_Hz}
+            designed = {"protocol": {"phases": phases}, "measurement": measured}
+            name, known = one.case.name, cases.get(one.case.name) or {}
+            if several:
+                name, known = f"{name}_{number}", {"sample": one.case.plain["sample"], **known}
+            cases[name] = overlaid(known, designed)
     text = yaml.safe_dump(config, sort_keys=False, default_flow_style=None, width=100)
     return f"# {WRITTEN_BY} {__version__}: a protocol by `biogrip design`.\n{text}"
 
 
 def _said(
     specimens: Sequence[Specimen],
-    before: Sequence[RatedProtocol],
-    after: Sequence[RatedProtocol],
+    before: Sequence[RatedProtocols],
+    after: Sequence[RatedProtocols],
     reached: Sequence[BoolArray],
 ) -> Iterator[str]:
     """Yield lines: a table, and what it takes for granted."""
@@ -382,10 +415,10 @@ def _said(
         values = {
             with_unit(f"noise of the {read.name}", read.unit): [one.noise, one.noise],
             with_unit(f"largest {controlled.name}", controlled.unit): [
-                largest_load(rating.phases) for rating in both
+                max(map(largest_load, rating.protocols), key=abs) for rating in both
             ],
-            "highest rate (Hz)": [1 / np.diff(rating.times_s).min() for rating in both],
-            "readings": [len(rating.times_s) for rating in both],
+            "highest rate (Hz)": [1 / np.diff(rating.times_s[0]).min() for rating in both],
+            "readings": [sum(map(len, rating.times_s)) for rating in both],
         }
         if instrument.has_jaws:
             values["least force of the jaws (N)"] = [rating.force_N for rating in both]

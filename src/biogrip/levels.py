@@ -226,7 +226,7 @@ LIKELIER = 6.0
 chance once in a hundred sweeps with the noise of these."""
 
 OF_PEAK_AT_REST = 0.02
-"""Load or reading of the first row, as a share of all, beyond noise, with which it was at rest."""
+"""Load or reading of the first row, as a share of all, up to which it was at rest."""
 
 WIDER_WITHOUT_REST = 5.0
 """Width of limits with any memory of before, over that from rest, from which on they hang on it."""

@@ -9,7 +9,7 @@ import pytest
 from biogrip.arrays import Array
 from biogrip.fit import trace_fit
 from biogrip.fit.experiment import Experiment
-from biogrip.fit.least_squares import identify_from
+from biogrip.fit.least_squares import _solved, identify_from
 from biogrip.fit.problem import Fit, TraceProblem
 from biogrip.fit.trace_fit import TraceFit, _has_settled, gripper_functions
 from biogrip.fit.trace_noise import NoiseModel
@@ -149,3 +149,11 @@ def test_an_uncertain_length_is_that_of_all_elements() -> None:
     np.testing.assert_allclose(odd, 0.5 * (above - below), rtol=1e-9, atol=1e-12)
     bent = 0.5 * (above + below) - nominal
     assert even @ bent / np.linalg.norm(even) / np.linalg.norm(bent) == pytest.approx(1.0)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_singular_step_is_no_number_and_no_warning() -> None:
+    matrices = np.array([np.ones((2, 2)), np.eye(2)])
+    solved = _solved(matrices, np.array([[1.0, 2.0], [1.0, 2.0]]))
+    assert not np.isfinite(solved[0]).any()
+    assert solved[1].tolist() == [1.0, 2.0]

@@ -75,3 +75,13 @@ def test_of_a_sample_that_is_not_linear_no_other_linear_model_is_advised() -> No
     assert any("of that at 2 Pa" in note["text"] for note in found["notes"])
     assert min(found["models"], key=lambda row: row["delta_bic"])["model"] == "burgers"
     assert found["advice"] is found["preferred_model"] is None
+
+
+def test_of_a_sample_that_is_not_linear_no_offset_is_advised() -> None:
+    """With an offset and a drift the fit would be good to 2 % of the peak, and not be rejected."""
+    phases = [{"duration_s": 75.0, "stress_Pa": level} for each in LEVELS for level in (each, 0.0)]
+    strain, config = staircase((1.0, 0.94, 0.88), 0), {"protocol": {"phases": phases}}
+    found = told_of(TIMES, strain, model="zener_kelvin", reads="strain", config=config).data
+    texts = [note["text"] for note in found["notes"]]
+    assert any("of that at 2 Pa" in text for text in texts)
+    assert not any("--offset" in text for text in texts), texts

@@ -89,6 +89,8 @@ def test_a_refit_moves_each_quantity_by_what_is_said(reads: str) -> None:
     best, trace = diagnosis.likelihood.best, diagnosis.likelihood.problem.residuals.trace
     names = ["gain", "phase"] if reads in SWEPT else ["zero", "gain", "clock", "rise"]
     assert [move.name for move in diagnosis.moves] == names
+    both = [move.words for move in diagnosis.moves if move.words.startswith("the moduli are read")]
+    assert len(both) == (reads in SWEPT)
     for move in diagnosis.moves:
         change = wrong(reads, move.name)
         wrongs = (trace.readings + sign * change for sign in (1, -1))

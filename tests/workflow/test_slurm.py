@@ -104,6 +104,7 @@ def test_the_page_on_clusters_gives_one_table_thrice(
     """Its files written and its commands typed as they stand, but for what a site needs."""
     for name, value in slurm.items():
         monkeypatch.setenv(name, value)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path / "src"), prepend=os.pathsep)
     clone(tmp_path)
     for name in ("profiles", "data"):
         shutil.copytree(ROOT / name, tmp_path / name)

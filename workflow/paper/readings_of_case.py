@@ -12,7 +12,7 @@ import biogrip_study.records.identifications as records
 from biogrip.arrays import Array
 from biogrip.config.source import overlaid
 from biogrip.files import write_rows
-from biogrip.fit.least_squares import fit_from
+from biogrip.fit.least_squares import refit
 from biogrip.fit.problem import Fit, TraceProblem
 from biogrip.keys import built
 from biogrip.physics.noise import add_noise, rms, stream
@@ -74,7 +74,7 @@ def _best(case: Case, name: str, seeds: Sequence[int], problems: list[TraceProbl
     starts = [np.log(np.maximum(fit.parameters, 1e-300)) for fit in best]
     starts = np.clip(starts, problems[0].low, problems[0].high)
     return [
-        fit.at(fit_from([problem], start))
+        refit(fit, problem, start)
         for fit, problem, start in zip(best, problems, starts, strict=True)
     ]
 

@@ -26,6 +26,9 @@ class DesignBlock(Block):
     largest."""
     duration_s: Annotated[float | None, Field(ge=1e-6, le=1e9)] = None
     """Duration. By default the protocol's."""
+    traces: Annotated[int, Field(ge=1, le=10)] = 1
+    """Traces of each sample, each under steps of its own, which are fitted together. By default
+    1."""
     parameters: Distinct[Annotated[tuple[str, ...], Field(max_length=40)]] = ()
     """Parameters asked for; the others are unknown all the same. By default all that are not
     fixed."""

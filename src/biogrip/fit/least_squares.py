@@ -258,10 +258,12 @@ def _free_step(gradient: Array, information: Array, damping: Array, fixed: BoolA
     return -scale * _solved(matrix, scale * gradient)
 
 
+@np.errstate(divide="ignore", invalid="ignore")
 def _solved(matrix: Array, vector: Array) -> Array:
     """Solve small positive definite systems, each step of elimination for all.
 
-    One that rounding makes singular has no finite step, where NumPy would raise an error for all.
+    One that rounding makes singular, as of a trace without noise, has no finite step, which is not
+    taken; NumPy would raise an error for all.
     """
     a, b = matrix.transpose(1, 2, 0).copy(), vector.T.copy()
     size = len(b)

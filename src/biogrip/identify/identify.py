@@ -58,6 +58,8 @@ _TERMS = 2
 _ROUNDING = 1e-6
 # Each of the others would take half a second to five; they are tried where the config names them.
 _POWER_LAWS = ["fractional_kelvin_voigt", "fractional_maxwell"]
+# Size, over the noise, of a constant of any size.
+_ANY = 1e9
 _SAME_NETWORK = "liquid_drop", "zener_maxwell"
 
 
@@ -135,18 +137,18 @@ def _notes_on_trace(judged: Diagnosis, on_fit: list[Note], opinion: list[Note]) 
     yield from on_fit
     if experiment.instrument.sweeps:
         return
-    yield from notes_on_gains(judged.likelihood, judged.notes)
+    yield from (gains := [*notes_on_gains(judged.likelihood, judged.notes)])
     start: list[Note] = []
     if recording.read.has_tip:
         # Imported here: most traces are of no tip.
         from biogrip.identify.recorded_load import notes_on_contact
 
         start += notes_on_contact(judged)
-    start = start or notes_on_start(recording, experiment, judged)
+    start = start or [*_notes_on_blocks(judged)] or notes_on_start(recording, experiment, judged)
     yield from start
     rounded = any(note.about == doubts.ROUNDED and note.weight == DOUBT for note in judged.notes)
-    # Beside another start, or errors of rounding, an offset and a drift mean nothing.
-    if not rounded and all(note.weight == HARMLESS for note in start):
+    # Beside another start, errors of rounding or gains an offset and a drift mean nothing.
+    if not (rounded or gains) and all(note.weight == HARMLESS for note in start):
         yield from opinion
     yield from _note_flow(recording, experiment)
     if not rounded:
@@ -472,6 +474,38 @@ def _note(diagnosis: Diagnosis, other: _Other, judged: Diagnosis) -> Note:
         )
     weight = DOUBT if changed else HARMLESS
     return Note(REJECTION if rejected else weight, text)
+
+
+def _notes_on_blocks(judged: Diagnosis) -> Iterator[Note]:
+    """Yield a note if a constant for each block that was joined explains a trace, of any sample.
+
+    So may an offset that was declared be one of a later block, but not what rows before the load
+    tell. That a step came between two rows looks like a small one.
+    """
+    recording, experiment = judged.identified
+    time_s, readings = recording.time_s, recording.readings
+    blocks = np.searchsorted(recording.later_blocks, recording.lines, side="right")
+    steps = np.array([blocks == block for block in np.unique(blocks)[1:]], np.float64)
+    declared = experiment.offset and "offset" not in experiment.undeclared
+    if not len(steps) or experiment.coloured or (judged.status == doubts.OK and not declared):
+        return
+    base = replace(experiment.to_identify(), offset=experiment.offset and not declared)
+    rows = base.in_noise(time_s, uncertain=_ANY * steps)
+    anew, whole, alone = (
+        fit_any_sample(other.of(time_s, readings, condensed=condensed).residuals)
+        for other, condensed in ((base, rows), (replace(base, offset=True), None), (base, None))
+    )
+    noise = levels.WHITE * anew.lags.residuals.noise_scale
+    if not anew.sd < noise < alone.sd or alone.sd < levels.FAR_OFF * alone.lags.residuals.peak:
+        return
+    ends_s = time_s[:-1][np.diff(blocks) > 0] + (recording.onset_s or 0.0)
+    so = " An offset throughout would do as well, with other values." if whole.sd < noise else ""
+    yield Note(
+        REJECTION if judged.status == REJECTED else DOUBT,
+        f"Readings seem to begin anew at {' s and '.join(map(plain, ends_s))} s: with a constant "
+        f"for each block, a linear sample explains the trace.{so} Add to each what was zeroed, or "
+        f"identify the first alone: --block {recording.read.blocks[0]}.",
+    )
 
 
 def _note_flow(recording: Recording, experiment: Experiment) -> Iterator[Note]:

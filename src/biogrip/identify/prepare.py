@@ -230,7 +230,8 @@ def without_steps(trace: Recording, protocol: Course) -> Recording:
     """
     at = np.isin(protocol.snapped(trace.time_s), protocol.jumps_s)
     times = trace.time_s[at] + (trace.onset_s or 0.0)
-    return replace(trace.part(~at), at_steps=tuple(times.tolist()))
+    left_out = zip(times.tolist(), trace.readings[at].tolist(), strict=True)
+    return replace(trace.part(~at), at_steps=tuple(left_out))
 
 
 def without_repeats(trace: Recording) -> Recording:

@@ -44,6 +44,7 @@ from biogrip.fit.trace_fit import contact_function
 from biogrip.fit.trace_noise import absorbed
 from biogrip.judging.diagnosis import Diagnosis
 from biogrip.judging.doubts import DOUBT, REJECTED, REJECTION, Note
+from biogrip.judging.onset import begins_constant
 from biogrip.judging.whiteness import is_still
 from biogrip.physics.modes import lag_course
 from biogrip.physics.noise import ROOT_12, estimate_noise, measure_rounding, without
@@ -121,8 +122,9 @@ def tare_of(experiment: Experiment, recording: Recording) -> float:
     """Return what is controlled in first rows that do not move, 0 if readings follow that.
 
     Whatever sample and offset, they would have to follow the record better without it; or as well,
-    if these rows precede the start; and without an offset not far worse. Before its contact a tip
-    has no tare.
+    if these rows precede the start; and without an offset not far worse. Where readings in these
+    rows tell an offset, as well will do, if they follow the record far worse without any. Before
+    its contact a tip has no tare.
     """
     record, load, start_s = experiment.record, recording.load, recording.read.start_s or 0.0
     if record is None or load is None or experiment.instrument.relative or recording.read.has_tip:
@@ -135,11 +137,15 @@ def tare_of(experiment: Experiment, recording: Recording) -> float:
     given = recording.time_s - start_s, recording.readings
     level = chdtri(1, levels.SURELY) / min(len(load), _MOST_READINGS)
     both = [experiment, replace(experiment, record=record - (0.0, tare))]
-    rest = _left_by_any([replace(posed, offset=True) for posed in both], *given)
-    if rest[0] <= rest[1] * np.exp(level if load[0, 0] >= start_s else -level):
+    may_have_one = experiment.offset or "offset" in experiment.undeclared
+    told = may_have_one and begins_constant(*given, float(load[len(first), 0]) - start_s)
+    kept, off = _left_by_any([replace(posed, offset=True) for posed in both], *given)
+    if kept <= off * np.exp(level if load[0, 0] >= start_s and not told else -level):
         return 0.0
-    rest = _left_by_any(both, *given)
-    return tare if rest[1] < rest[0] * np.exp(level) else 0.0
+    bare = [replace(posed, offset=posed.offset and not told) for posed in both]
+    rest = _left_by_any(bare, *given)
+    left = off * np.exp(2 * level) if told else rest[1]
+    return tare if left < rest[0] * np.exp(level) else 0.0
 
 
 def _left_by_any(experiments: Sequence[Experiment], time_s: Array, readings: Array) -> list[float]:

@@ -253,7 +253,9 @@ def name_suspects(residuals: Residuals, times: float, scale: float) -> str:
     inadequate = f"the model is not adequate, as a linear sample of another kind fits to {noises}"
     if whiteness.correlated(*left)[1] >= levels.FALSE_ALARM:
         if other > levels.TOO_MUCH and times < other * levels.TOO_MUCH:
-            return f"single readings are far off, as no linear sample leaves less than {noises}"
+            place = residuals.course.place(residuals.trace.time_s[np.argmax(np.abs(left[0]))])
+            furthest = f"single readings are far off, the furthest at {place}"
+            return f"{furthest}, as no linear sample leaves less than {noises}"
         return inadequate
     if other * levels.TOO_MUCH < times:
         return f"{inadequate}; the rest comes from {culprits}"

@@ -25,7 +25,6 @@ from itertools import combinations, pairwise
 from math import inf
 
 import numpy as np
-from scipy.special import chdtri, fdtri
 
 import biogrip.levels as levels
 from biogrip.arrays import Array, BoolArray
@@ -337,6 +336,9 @@ def increase_at(confidence: float, freedom: float, told: int = 1) -> float:
 
     It is of chi-squared if the freedom, with which the noise is known, is infinite.
     """
+    # Imported here: what only names quantities loads no SciPy.
+    from scipy.special import chdtri, fdtri
+
     if freedom == inf:
         return float(chdtri(told, 1 - confidence))
     return told * float(fdtri(told, freedom, confidence))

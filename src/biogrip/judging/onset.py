@@ -273,7 +273,7 @@ def notes_on_start(
     known = followed and experiment.load_errors is None
     if known and not experiment.coloured and len(time_s) <= MANY:
         notes += _about_load(diagnosis)
-    if followed and not experiment.offset and _begins_amid(experiment.record, readings):
+    if followed and not experiment.offset and _begins_amid(experiment.record, recording):
         notes += _about_rest(diagnosis)
     return notes
 
@@ -334,14 +334,20 @@ def _about_load(diagnosis: Diagnosis) -> Iterator[Note]:
         )
 
 
-def _begins_amid(record: Array | None, readings: Array) -> bool:
+def _begins_amid(record: Array | None, recording: Recording) -> bool:
     """Return True if a recorded load moves at its first rows, and a sample felt something then."""
     assert record is not None
-    least = (
-        (each, levels.OF_PEAK_AT_REST * float(np.ptp(each))) for each in (record[:, 1], readings)
+    load, (time_s, *_), (reading, *_) = record[:, 1], recording.time_s, recording.readings
+    # What was read at the first row is left out where a sample may jump.
+    if recording.at_steps and recording.at_steps[0][0] - (recording.onset_s or 0.0) < time_s:
+        time_s, reading = record[0, 0], recording.at_steps[0][1]
+    pairs = (load[0], load), (reading if time_s <= record[0, 0] else 0.0, recording.readings)
+    felt = (
+        abs(first) > levels.OF_PEAK_AT_REST * np.ptp(of)
+        and abs(first) > levels.OUTLYING * estimate_noise(of)
+        for first, of in pairs
     )
-    felt = any(abs(each[0]) > size + levels.OUTLYING * estimate_noise(each) for each, size in least)
-    return felt and not is_still(record[: levels.FEWEST_STILL, 1])
+    return any(felt) and not is_still(load[: levels.FEWEST_STILL])
 
 
 def _about_rest(diagnosis: Diagnosis) -> Iterator[Note]:

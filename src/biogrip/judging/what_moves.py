@@ -71,16 +71,16 @@ def find_mistakes(residuals: Residuals, response: Response) -> Iterator[Mistake]
         channel.name.replace("_", " ")
         for channel in (residuals.instrument.read, residuals.instrument.controlled)
     )
-    gain = f"the {read} is read 1 % too large"
     if residuals.course.sweeps:
         turned = np.where(is_storage(time_s), -1.0, 1.0) * shown[::-1]
-        yield Mistake("gain", gain, _WRONG_SHARE * shown)
+        yield Mistake("gain", "the moduli are read 1 % too large", _WRONG_SHARE * shown)
         if np.any(is_storage(time_s)):
             yield Mistake("phase", "the phase is read 1 degree too large", _WRONG_PHASE * turned)
         return
     zero = np.full(len(time_s), _WRONG_SHARE * float(np.max(np.abs(shown))))
     yield Mistake("zero", "the zero is 1 % of the peak too high", zero)
-    yield Mistake("gain", f"{gain}, or the {controlled} 1 % too small", _WRONG_SHARE * shown)
+    gain = f"the {read} is read 1 % too large, or the {controlled} 1 % too small"
+    yield Mistake("gain", gain, _WRONG_SHARE * shown)
     interval_s, first_s = spacing_at(time_s, 0.0), float(time_s[time_s > 0][0])
     earlier = residuals.later(-interval_s)
     words = f"the {controlled} came one interval between readings, {interval_s:.2g} s, earlier"

@@ -46,7 +46,7 @@ def sum_of_responses(
     """
     n, sums, terms = mixing.shape
     rows, slopes = np.zeros((n, sums, len(time_s))), terms > rates.shape[1]
-    for some in parts(n, max(1, _MODE_NUMBERS_AT_ONCE // (rates.shape[1] * len(time_s)))):
+    for some in parts(n, max(1, _MODE_NUMBERS_AT_ONCE // max(1, rates.shape[1] * len(time_s)))):
         for here, both in responses_in_turn(rates[some], course, time_s, slopes=slopes):
             # One product per sample: the order of its sums does not depend on their number.
             rows[some, :, here] = (mixing[some] @ np.concatenate(both, axis=1)).real

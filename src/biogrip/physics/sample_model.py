@@ -260,7 +260,7 @@ SINGLE_BRANCH: tuple[Parameter, ...] = (K, K_P, C, C_P)
 
 _SIGNS = {"stiffness": "/\\/\\", "damping": "[==]", "springpot": "<>"}
 # What an element is multiplied by to be gone, or rigid; a change that is none; where it is seen.
-_GONE, _RIGID, _UNSEEN, _OMEGA = 1e-9, 1e9, 1e-4, np.array([0.03, 0.3, 3.0])
+_TO_BE_GONE, _TO_BE_RIGID, _UNSEEN, _OMEGA = 1e-9, 1e9, 1e-4, np.array([0.03, 0.3, 3.0])
 
 
 @cache
@@ -284,11 +284,11 @@ def sketched(model: SampleModel) -> str:
 
 def _in_series_with(element: str, model: SampleModel) -> list[str]:
     """Return the elements of which the response does not depend when one is gone."""
-    if np.all(_modulus(model, {element: _RIGID}) > _RIGID**0.5):
+    if np.all(_modulus(model, {element: _TO_BE_RIGID}) > _TO_BE_RIGID**0.5):
         return []
-    gone, size = _modulus(model, {element: _GONE}), _modulus(model, {})
+    gone, size = _modulus(model, {element: _TO_BE_GONE}), _modulus(model, {})
     others = [p.name for p in model.parameters if p.kind in _SIGNS and p.name != element]
-    changes = {name: _modulus(model, {element: _GONE, name: 2.0}) - gone for name in others}
+    changes = {name: _modulus(model, {element: _TO_BE_GONE, name: 2.0}) - gone for name in others}
     return [name for name, change in changes.items() if np.all(abs(change) < _UNSEEN * size)]
 
 

@@ -130,10 +130,10 @@ def unit_of(
         end = _said_at_end(column)
         found = f"the unit '{shortened(end)}' at the end of the name" if end else "no unit"
         row = f" (but '{shortened(below)}' below it)" if below else ""
-        raise BiogripError(
-            f"{where}: found {found}{row}; allowed are {choices}, by {said_by} or at the end of "
-            f"the name.{_hint(column, allowed, at_end or in_row or '')}"
-        )
+        kind = at_end or in_row or ""
+        how = "" if kind else f", by {said_by} or at the end of the name"
+        hint = _hint(column, allowed, kind)
+        raise BiogripError(f"{where}: found {found}{row}; allowed are {choices}{how}.{hint}")
     for other, said in ((at_end, "the name"), (in_row, "the row of units")):
         if other not in (None, unit):
             raise BiogripError(

@@ -90,8 +90,8 @@ class Recording:
     """Time of the clock at which the protocol starts, if that was given or fitted."""
     gaps: int = 0
     """Number of rows left out for want of a number."""
-    at_steps: tuple[float, ...] = ()
-    """Times by the clock of readings that were left out where a sample may jump."""
+    at_steps: tuple[tuple[float, float], ...] = ()
+    """Readings that were left out where a sample may jump, with their times by the clock."""
     load_noise: float = 0.0
     """Standard deviation of what was smoothed out of `load`, as a share of its largest value."""
     form: Mapping[str, Any] = field(default_factory=dict)
@@ -103,6 +103,8 @@ class Recording:
     load: Array | None = None
     """Times and loads, or deformations, in SI units, (n, 2), where they are read: of all rows, used
     or not."""
+    later_blocks: tuple[int, ...] = ()
+    """First line of each block that was joined to the first."""
 
     def part(self, kept: BoolArray) -> "Recording":
         """Return some of the readings, (n_samples,) true for those."""
@@ -134,7 +136,7 @@ class Recording:
         form = self.form
         for key, text in _REMARKS.items():
             if form.get(key):
-                found = form[key] if isinstance(form[key], str) else counted(form[key], "row")
+                found = form[key] if isinstance(form[key], str) else counted(form[key], "reading")
                 said.append(text.format(found, axis=_PLURALS[self.read.axis], **form))
         if self.load_noise:
             said.append(
@@ -145,7 +147,7 @@ class Recording:
             begins = ", when the protocol is taken to start" * form["clock"].startswith("dates")
             said.append(f"Times are {form['clock']}{begins * (self.onset_s is None)}.")
         if self.at_steps:
-            times = ", ".join(f"{time_s:.6g} s" for time_s in self.at_steps)
+            times = ", ".join(f"{time_s:.6g} s" for time_s, _ in self.at_steps)
             said.append(
                 "Left out where a sample may jump, at a step or where the rate of a deformation "
                 "jumps, since nothing tells on which side they were taken: "
@@ -225,7 +227,8 @@ def read_recording(path: Path, columns: MeasurementBlock) -> Recording:
     form = {key: value for key, value in form.items() if value is not None}
     if load is None and not columns.instrument.has_jaws and len(parts) == 1:
         remarks += tuple(_about_rise(sheet, table, parts[0], columns))
-    return replace(recording, form=form, load=load, remarks_before=remarks)
+    later = tuple(int(line) for part in parts[1:] for line in part.lines[:1])
+    return replace(recording, form=form, load=load, remarks_before=remarks, later_blocks=later)
 
 
 @dataclass(frozen=True)
