@@ -247,7 +247,8 @@ def name_suspects(residuals: Residuals, times: float, scale: float) -> str:
     gives = "gives this trace under this protocol"
     culprits = "load, clock, contact, drift, or a sample that is not linear"
     if residuals.course.sweeps:
-        gives = "has both moduli (Kramers-Kronig)"
+        which = "both" if residuals.instrument.partners else "these"
+        gives = f"has {which} moduli (Kramers-Kronig)"
         _, culprits = whiteness.find_inertia(residuals, *left)
     noises = "the noise" if least == "1" else f"{least} times the noise"
     inadequate = f"the model is not adequate, as a linear sample of another kind fits to {noises}"
