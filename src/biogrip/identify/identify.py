@@ -147,8 +147,9 @@ def _notes_on_trace(judged: Diagnosis, on_fit: list[Note], opinion: list[Note]) 
     start = start or [*_notes_on_blocks(judged)] or notes_on_start(recording, experiment, judged)
     yield from start
     rounded = any(note.about == doubts.ROUNDED and note.weight == DOUBT for note in judged.notes)
-    # Beside another start, errors of rounding or gains an offset and a drift mean nothing.
-    if not (rounded or gains) and all(note.weight == HARMLESS for note in start):
+    # Beside another start, errors of rounding or gains that reject a fit they mean nothing.
+    other = *start, *(note for note in gains if note.weight == REJECTION)
+    if not rounded and all(note.weight == HARMLESS for note in other):
         yield from opinion
     yield from _note_flow(recording, experiment)
     if not rounded:
