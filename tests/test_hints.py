@@ -238,7 +238,7 @@ KINDS = {
         *("A ramp is given by --ramp DURATION", " % at the highest: correct for it, or leave"),
         " A length is a strain by a scale or",
         *(" A pressure sucks into a pipette", "that reading (--from)"),
-        *(" Or say what is read, as by --reading ", ". Say which, as in --reading loss=COLUMN."),
+        *(" Or say what is read, as by --reading ", "--reading loss=COLUMN, or in a table"),
         *(
             "; give yours with --config.",
             "; allowed with a model, as by --model",

@@ -97,6 +97,17 @@ def test_a_loss_modulus_alone_tells_what_relaxes(tmp_path: Path) -> None:
         assert "only the loss modulus is read" in message
 
 
+def test_a_table_of_traces_names_both_moduli_by_keys(tmp_path: Path) -> None:
+    write_trace(tmp_path / "sweep.csv", OMEGA, *solid(), header="w in rad/s,S in Pa,L in Pa")
+    sheet, first = tmp_path / "sheet.csv", "sweep.csv,w in rad/s,S in Pa,L in Pa"
+    sheet.write_text(f"file,frequency,measurement.storage,loss\n{first}\n")
+    _, _, message = identify(sheet, "--model", "sls")
+    key = message.split()[-1].rstrip(".")
+    sheet.write_text(f"file,frequency,measurement.storage,{key}\n{first}\n")
+    code, _, _ = identify(sheet, "--model", "sls", "--no-compare")
+    assert (code, key) == (0, "measurement.loss")
+
+
 def measured(sweep: str) -> Array:
     """Frequencies, storage and loss moduli, by row."""
     return np.loadtxt(Path(__file__).parent / "sweeps" / f"{sweep}.csv", delimiter=",").T

@@ -55,6 +55,19 @@ def test_a_header_may_have_several_rows(tmp_path: Path, name: str) -> None:
     assert found.gaps == 0
 
 
+def test_minutes_and_seconds_are_times_and_units_may_be_a_comment(tmp_path: Path) -> None:
+    rows = [f"{s // 60:02}:{s % 60:02}.5,{s}" for s in range(50, 70)]
+    found = read(tmp_path / "t.csv", ["t,x_%", *rows], time="t", reading="x_%")
+    np.testing.assert_allclose(found.time_s, np.arange(50, 70) + 0.5)
+    # 01:05 may be hours and minutes, and 1:75.5 is none.
+    for cell in ("01:05", "1:75.5", "1:05:75"):
+        message = said(tmp_path / "t.csv", ["t,x_%", *rows, f"{cell},1"], time="t", reading="x_%")
+        assert f"line 22, column 't': found '{cell}'" in message
+    for units in (["% ms, %, -", "t,x,n"], ["t,x,n", "% ms, %, -"]):
+        found = read(tmp_path / "t.csv", [*units, *ROWS], time="t", reading="x")
+        np.testing.assert_allclose(found.time_s, np.arange(12) / 2e3)
+
+
 def test_what_is_no_header_is_a_damaged_row(tmp_path: Path) -> None:
     for row, message in (
         ("0.5,T,1", "line 3, column 'x': found 'T', allowed is a finite number"),

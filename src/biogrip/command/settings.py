@@ -197,13 +197,12 @@ def is_table(asked: Asked) -> bool:
     """
     with asked.trace.open("rb") as stream:
         lines = stream.read(_HEAD_BYTES).decode("utf-8-sig", "replace").splitlines()
-    parted = (re.split(f"[{SEPARATORS}]", line) for line in lines)
-    rows = [{cell.strip(' "'): None for cell in cells} for cells in parted] or [{}]
+    rows = [[it.strip(' "') for it in re.split(f"[{SEPARATORS}]", line)] for line in lines or [""]]
     measured = measured_keys(asked.given)
     readings = {measured[key] for key in READINGS if key in measured} or {"rotation_rad"}
     axes = {measured.get("time", "time_s"), measured.get("frequency")}
-    of_trace = any(axes & row.keys() and readings & row.keys() for row in rows)
-    return file_column([*rows[0]]) is not None and not of_trace
+    of_trace = any(axes & {*row} and readings & {*row} for row in rows)
+    return file_column(rows[0]) is not None and not of_trace
 
 
 def file_column(names: Sequence[str]) -> str | None:

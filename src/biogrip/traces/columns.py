@@ -278,7 +278,8 @@ def _is_ratio(column: str) -> bool:
 
 
 def _bare(cell: str) -> str:
-    plain = plain_name(cell)
+    # A row of units may be a comment.
+    plain = plain_name(cell).removeprefix("% ")
     return plain[1:-1].strip() if in_brackets(plain) else plain
 
 

@@ -29,15 +29,15 @@ def how_they_differ(places: Array, readings: Array, *, sweeps: bool) -> str:
     the order of the file. Where nothing tells the noise, they are repeats. Rows of one time may
     differ between first and last, as where a rounded clock writes the course of a second.
     """
-    peaks = np.maximum(np.max(np.abs(readings), axis=0), np.finfo(float).tiny)
-    sizes = np.log(readings) if np.all(readings > 0) else readings / peaks
+    largest = max(float(np.max(np.abs(readings))), np.finfo(float).tiny)
+    sizes = np.log(readings) if np.all(readings > 0) else readings / largest
     middle, first, group, counts = np.unique(
         places, return_index=True, return_inverse=True, return_counts=True
     )
     last = len(places) - 1 - np.unique(places[::-1], return_index=True)[1]
     more, free = len(places) - len(middle), (len(middle) - 2) // 2
     steps = (sizes[last] - sizes[first])[counts > 1]
-    # Of each test degrees of freedom, and for each column a size and the noise.
+    # Of each test degrees of freedom, and the squares of what differs and of noise, by column.
     tests = list[tuple[int, int, Array, Array]]()
     if free > 0 and more:
         means = np.array([np.bincount(group, column) / counts for column in sizes.T])
@@ -54,12 +54,9 @@ def how_they_differ(places: Array, readings: Array, *, sweeps: bool) -> str:
 
     for one, other, square, noise in tests:
         ratio = square / np.maximum(noise, np.finfo(float).tiny)
-        if np.any(fdtrc(one, other, ratio) <= levels.CONDITIONS / (len(tests) * sizes.shape[1])):
-            worst = int(np.argmax(ratio))
-            apart, scatter = (
-                plain(100 * float(np.sqrt(it[worst])), 2)
-                for it in (np.mean(steps**2, axis=0), noise)
-            )
+        if fdtrc(one, other, ratio.max()) <= levels.CONDITIONS / (len(tests) * len(ratio)):
+            squares = np.mean(steps**2, axis=0)[ratio.argmax()], noise[ratio.argmax()]
+            apart, scatter = (plain(100 * float(size), 2) for size in np.sqrt(squares))
             return f"differ by {apart} % from the first to the last row, by noise of {scatter} %"
     return ""
 
@@ -92,18 +89,13 @@ def alike(cells: Sequence[str], wanted: float | str) -> set[str]:
     again, groups = len({*cells}) <= len(cells) // FEWEST_ROWS, defaultdict[str, set[str]](set)
     for cell, mean in zip(cells, cells if again else _measured(cells), strict=True):
         groups[mean].add(cell)
-    found = set[str]()
+    found, least = set[str](), levels.MEASURED_ALIKE * abs(wanted)
     for group in groups.values():
         numbers = [*map(_number_in, group)]
-        between = min(numbers) <= wanted <= max(numbers)
-        if between or str(wanted) in group or any(_is_near(it, wanted) for it in numbers):
+        near = any(abs(it - wanted) <= least and not it.is_integer() for it in numbers)
+        if near or str(wanted) in group or min(numbers) <= wanted <= max(numbers):
             found |= group
     return found
-
-
-def _is_near(number: float, wanted: float) -> bool:
-    near = abs(number - wanted) <= levels.MEASURED_ALIKE * abs(wanted)
-    return near and not number.is_integer()
 
 
 def _measured(cells: Sequence[str]) -> list[str]:

@@ -331,7 +331,8 @@ class MeasurementBlock(Block):
         if len(partners := given & {*PARTNERS}) != 1:
             found = " and ".join(sorted(partners)) or "none"
             text = f"goes with one of {', '.join(PARTNERS)}; found {found}"
-            yield (self.readings[0],), f"{text}. Say which, as in --reading loss=COLUMN."
+            way = "--reading loss=COLUMN, or in a table of traces by a column measurement.loss"
+            yield (self.readings[0],), f"{text}. Say which, as in {way}."
         if self.coloured:
             yield ("noise_model",), "found coloured, allowed with a frequency sweep is white."
         if self.readings == [LOSS.name]:

@@ -516,7 +516,7 @@ def _numbers(
             )
     form = {"decimal": _DECIMAL[decimal], "unclear": unclear or None}
     if clock:
-        form["clock"] = "hours:minutes:seconds"
+        form["clock"] = "hours:minutes:seconds, perhaps without hours"
         if np.nanmin(values[:, 0]) > _DATED_S:
             form["clock"] = "dates, from the first"
         else:

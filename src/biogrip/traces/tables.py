@@ -57,7 +57,8 @@ _ROW = re.compile(r'[\s",;]*[-+]?[.\d][\d.,:eE+-]*[\s",;]')
 # Numbers with points or commas, and of these such whose marks may be between thousands.
 _MARKED = re.compile(r"[-+]?\d*[.,][\d.,]*(?:[eE][-+]?\d+)?")
 _IN_THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2}([.,])\d{3}(?:\1\d{3})*")
-_CLOCK = re.compile(r"(\d{1,6}):([0-5]\d):([0-5]\d(?:[.,]\d+)?)")
+# Of two numbers, minutes and seconds have a fraction: else they may as well be hours and minutes.
+_CLOCK = re.compile(r"(?=\d+:\d+[:.,])(?:(\d{1,6}):(?=[0-5]\d:))?(\d{1,6}):([0-5]\d(?:[.,]\d+)?)")
 _DATE = re.compile(r"(\d\d)\.(\d\d)\.(\d{4})")
 DAY_S = 86_400
 """Seconds of a day."""
@@ -66,8 +67,6 @@ _GAPS = ("", "-", "na", "n/a", "#n/a", "#nv")
 _NUMERIC = re.compile(r"[-+]?\d[-+\d.,:;'\u2019\sTZeE]*|[-+]?[.,]\d[\deE+-]*")
 # What a spreadsheet writes of a failed formula.
 _FAILED_FORMULA = re.compile(r"#[A-Z]")
-# What is above the name of a step, above the names of its columns.
-_STEP = "[step]"
 _MOST_HEADER_ROWS = 5
 _PREAMBLE_LINES_SHOWN = 3
 _NAMES_SHOWN = 8
@@ -318,16 +317,12 @@ def _cells_of(line: str, separator: str, width: int = 0) -> list[str]:
     if separator != BLANKS:
         return line.split(separator)
     tabbed = line.split("\t")
-    if len(tabbed) > 1 and (len(tabbed) == width or max(map(_count_words, tabbed)) < 2):
+    if tabbed[1:] and (len(tabbed) == width or all(len(_CELL.findall(it)) < 2 for it in tabbed)):
         return tabbed
     if _OTHERWISE.search(line):
         return [line]
     wide = _WIDE_GAP.split(line.strip())
     return wide if len(wide) == width else _CELL.findall(line)
-
-
-def _count_words(cell: str) -> int:
-    return len(_CELL.findall(cell))
 
 
 def _names(cells: Sequence[str]) -> set[str]:
@@ -339,8 +334,7 @@ def _separator(lines: Sequence[str], headers: Sequence[str], wanted: set[str]) -
 
     Where no line is a row of numbers, all lines count: else words of a preamble would.
     """
-    searched = lines[:_LINES_SEARCHED]
-    searched = [line for line in searched if _ROW.match(line + " ")] or searched
+    searched = [row for row in lines[:_LINES_SEARCHED] if _ROW.match(row + " ")] or lines
 
     def merit(separator: str) -> tuple[int, int]:
         common = 0
@@ -428,7 +422,7 @@ def _header(sheet: Sheet, at: int, columns: MeasurementBlock) -> Table | None:
     A header has the columns to read, or is above a row of units in brackets and rows of numbers,
     or follows ``[step]`` and the name of a step.
     """
-    is_step = at >= 2 and str(sheet.cells[at - 2, 0]).lower() == _STEP
+    is_step = at >= 2 and str(sheet.cells[at - 2, 0]).lower() == "[step]"
     table = Table(at, sheet.cells[at, : sheet.widths[at]].tolist(), at + 1, is_step=is_step)
     if table.common(columns) == len(columns.named):
         return _with_header_rows(sheet, table, columns)
@@ -438,8 +432,6 @@ def _header(sheet: Sheet, at: int, columns: MeasurementBlock) -> Table | None:
     most = min(at + 1 + _MOST_HEADER_ROWS, len(sheet.cells))
     below = [row for row in range(at + 1, most) if any(sheet.cells[row])]
     if len(below) < 2 or any(sheet.cells[below[0], len(table.names) :]):
-        return None
-    if str(sheet.cells[below[0], 0]).lower() == _STEP:
         return None
     units = sheet.cells[below[0], : len(table.names)].tolist()
     numbers = [_count_numbers(sheet.cells[row]) for row in below[1:]]
@@ -572,7 +564,7 @@ def seconds_or_inf(cell: str) -> float:
     """Return seconds of hours, minutes, seconds, and perhaps a date, else as `number_or_inf`."""
     if found := _CLOCK.fullmatch(cell):
         hours, minutes, seconds = found.groups()
-        return 3600 * int(hours) + 60 * int(minutes) + float(seconds.replace(",", "."))
+        return 3600 * int(hours or 0) + 60 * int(minutes) + float(seconds.replace(",", "."))
     if cell.count(":") > 1:
         with suppress(ValueError):
             moment = datetime.fromisoformat(_DATE.sub(r"\3-\2-\1", cell))
