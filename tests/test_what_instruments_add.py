@@ -298,3 +298,17 @@ def test_one_modulus_far_off_in_a_sweep_is_named(tmp_path: Path, *, turned: bool
     assert found["fit"] == "rejected"
     place = f"{omega[12]:.4g} rad/s (loss)" if turned else f"{omega[0]:.4g} rad/s (storage)"
     assert f"single readings are far off, the furthest at {place}, as" in found["reasons"][0]
+
+
+def test_contacts_that_are_off_are_told_before_traces_that_do_not_agree(tmp_path: Path) -> None:
+    """Of one sphere and sample: contacts 60 nm before and after make it softer and stiffer."""
+    for name, off_m in (("early", OFF_M), ("late", -OFF_M)):
+        approach(off_m, tmp_path / f"{name}.csv")
+    sheet = tmp_path / "cells.csv"
+    sheet.write_text("file,sample\nearly.csv,cell\nlate.csv,cell\n")
+    status, said, complained = identify(sheet, *SPHERE, "--model", "zener_maxwell", "--no-compare")
+    assert not status, complained
+    before, _, after = said.partition("The traces are not of one linear sample")
+    assert after
+    for side in ("before", "after"):
+        assert re.search(rf"touch about \d+ nm {side} the zero .* --contact fit\.", before)

@@ -145,7 +145,7 @@ def _notes_on_trace(judged: Diagnosis, on_fit: list[Note], opinion: list[Note]) 
 
         start += notes_on_contact(judged)
     start = start or [*_notes_on_blocks(judged)] or notes_on_start(recording, experiment, judged)
-    yield from start
+    yield from (it if it.weight == HARMLESS else replace(it, about=doubts.SET_UP) for it in start)
     rounded = any(note.about == doubts.ROUNDED and note.weight == DOUBT for note in judged.notes)
     # Beside another start, errors of rounding or gains an offset and a drift mean nothing.
     if not (rounded or gains) and all(note.weight == HARMLESS for note in start):
