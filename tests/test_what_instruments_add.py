@@ -312,3 +312,28 @@ def test_contacts_that_are_off_are_told_before_traces_that_do_not_agree(tmp_path
     assert after
     for side in ("before", "after"):
         assert re.search(rf"touch about \d+ nm {side} the zero .* --contact fit\.", before)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_load_that_was_taken_off_unsaid_is_named(tmp_path: Path, seed: int) -> None:
+    """Creep by 1/500 at once and by 1/400 with 5 s, and recovery after 60 s, under a hold.
+
+    By chance that is no response, which is refused, or a fit, which is rejected.
+    """
+
+    def compliance(time_s: Array) -> Array:
+        return (time_s > 0) * (1 / 500 - np.expm1(-np.maximum(time_s, 0) / 5) / 400)
+
+    time_s = np.linspace(0.5, 119.5, 239)
+    scatter = 1e-4 * np.random.default_rng(seed).standard_normal(239)
+    strain = 10 * (compliance(time_s) - compliance(time_s - 60)) + scatter
+    trace = write_trace(tmp_path / "t.csv", time_s, strain, header="time_s,strain")
+    given = ("--reading", "strain", "--hold", "10 Pa", "--model", "zener_kelvin", "--no-compare")
+    status, said, complained = identify(trace, *given)
+    assert bool(status) == bool(seed)
+    assert "after 60 s, as if nothing was held from there on: --until 60." in said + complained
+    holds(identified(tmp_path, trace, *given, "--until", "60"), k_s=500.0, k_v=400.0)
+    # An outlier is no end.
+    spoilt = 10 * compliance(time_s) + scatter + 0.1 * (time_s == 40)
+    write_trace(trace, time_s, spoilt, header="time_s,strain")
+    assert "as if nothing was held" not in "".join(identify(trace, *given)[1:])
