@@ -337,3 +337,19 @@ def test_a_load_that_was_taken_off_unsaid_is_named(tmp_path: Path, seed: int) ->
     spoilt = 10 * compliance(time_s) + scatter + 0.1 * (time_s == 40)
     write_trace(trace, time_s, spoilt, header="time_s,strain")
     assert "as if nothing was held" not in "".join(identify(trace, *given)[1:])
+
+
+def test_of_a_dwell_alone_the_block_that_tells_its_zero_is_named(tmp_path: Path) -> None:
+    """Taken for a step from zero, k_p would be a tenth too large."""
+    whole = approach(0.0, tmp_path / "afm.csv").read_text().splitlines()
+    at = 1 + round(0.75 / 0.025)
+    (tmp_path / "blocks.csv").write_text("\n".join([*whole[:at], whole[0], *whole[at:]]))
+    given = (*SPHERE[:2], *SPHERE[-2:], "--model", "zener_maxwell", "--no-compare")
+    trace, hold = tmp_path / "blocks.csv", ("--hold", "500 nm", "--start", "0.75")
+    alone = identified(tmp_path, trace, *given, *hold, "--block", "2")
+    said = "Block 1 tells the zero and the approach: read it, too, with --load DEPTH."
+    assert said in [note["text"] for note in alone["notes"]]
+    assert by_quantity(alone)["k_p"]["low"] > 820
+    found = identified(tmp_path, trace, *given, "--load", "depth_m", "--block", "1,2")
+    assert said not in [note["text"] for note in found["notes"]]
+    holds(found, k=1200.0, k_p=800.0, tau=3.0)
