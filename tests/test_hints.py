@@ -211,7 +211,6 @@ def test_advice_beside_a_result_helps(tmp_path: Path, make: object) -> None:
 KINDS = {
     "typed here": (
         *(
-            "--block 1,2",
             " Add to each what was zeroed, or identify",
             "is one, as by --block 1,",
             "--rows ",
