@@ -229,6 +229,8 @@ KINDS = {
             " times as wide. If it was moved before, leave",
             " s after the step of the protocol, as if",
         ),
+        " tells the zero and the approach: read it, too, with --load",
+        " s, as if nothing was held from there on: --until ",
         *("--start says when", "). If it does, say --start fit", "say --contact fit"),
         "It is damaged: the same command with",
     ),

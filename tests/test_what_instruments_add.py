@@ -298,3 +298,58 @@ def test_one_modulus_far_off_in_a_sweep_is_named(tmp_path: Path, *, turned: bool
     assert found["fit"] == "rejected"
     place = f"{omega[12]:.4g} rad/s (loss)" if turned else f"{omega[0]:.4g} rad/s (storage)"
     assert f"single readings are far off, the furthest at {place}, as" in found["reasons"][0]
+
+
+def test_contacts_that_are_off_are_told_before_traces_that_do_not_agree(tmp_path: Path) -> None:
+    """Of one sphere and sample: contacts 60 nm before and after make it softer and stiffer."""
+    for name, off_m in (("early", OFF_M), ("late", -OFF_M)):
+        approach(off_m, tmp_path / f"{name}.csv")
+    sheet = tmp_path / "cells.csv"
+    sheet.write_text("file,sample\nearly.csv,cell\nlate.csv,cell\n")
+    status, said, complained = identify(sheet, *SPHERE, "--model", "zener_maxwell", "--no-compare")
+    assert not status, complained
+    before, _, after = said.partition("The traces are not of one linear sample")
+    assert after
+    for side in ("before", "after"):
+        assert re.search(rf"touch about \d+ nm {side} the zero .* --contact fit\.", before)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_load_that_was_taken_off_unsaid_is_named(tmp_path: Path, seed: int) -> None:
+    """Creep by 1/500 at once and by 1/400 with 5 s, and recovery after 60 s, under a hold.
+
+    By chance that is no response, which is refused, or a fit, which is rejected.
+    """
+
+    def compliance(time_s: Array) -> Array:
+        return (time_s > 0) * (1 / 500 - np.expm1(-np.maximum(time_s, 0) / 5) / 400)
+
+    time_s = np.linspace(0.5, 119.5, 239)
+    scatter = 1e-4 * np.random.default_rng(seed).standard_normal(239)
+    strain = 10 * (compliance(time_s) - compliance(time_s - 60)) + scatter
+    trace = write_trace(tmp_path / "t.csv", time_s, strain, header="time_s,strain")
+    given = ("--reading", "strain", "--hold", "10 Pa", "--model", "zener_kelvin", "--no-compare")
+    status, said, complained = identify(trace, *given)
+    assert bool(status) == bool(seed)
+    assert "after 60 s, as if nothing was held from there on: --until 60." in said + complained
+    holds(identified(tmp_path, trace, *given, "--until", "60"), k_s=500.0, k_v=400.0)
+    # An outlier is no end.
+    spoilt = 10 * compliance(time_s) + scatter + 0.1 * (time_s == 40)
+    write_trace(trace, time_s, spoilt, header="time_s,strain")
+    assert "as if nothing was held" not in "".join(identify(trace, *given)[1:])
+
+
+def test_of_a_dwell_alone_the_block_that_tells_its_zero_is_named(tmp_path: Path) -> None:
+    """Taken for a step from zero, k_p would be a tenth too large."""
+    whole = approach(0.0, tmp_path / "afm.csv").read_text().splitlines()
+    at = 1 + round(0.75 / 0.025)
+    (tmp_path / "blocks.csv").write_text("\n".join([*whole[:at], whole[0], *whole[at:]]))
+    given = (*SPHERE[:2], *SPHERE[-2:], "--model", "zener_maxwell", "--no-compare")
+    trace, hold = tmp_path / "blocks.csv", ("--hold", "500 nm", "--start", "0.75")
+    alone = identified(tmp_path, trace, *given, *hold, "--block", "2")
+    said = "Block 1 tells the zero and the approach: read it, too, with --load DEPTH."
+    assert said in [note["text"] for note in alone["notes"]]
+    assert by_quantity(alone)["k_p"]["low"] > 820
+    found = identified(tmp_path, trace, *given, "--load", "depth_m", "--block", "1,2")
+    assert said not in [note["text"] for note in found["notes"]]
+    holds(found, k=1200.0, k_p=800.0, tau=3.0)

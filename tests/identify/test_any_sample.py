@@ -66,4 +66,3 @@ def test_table_and_page_have_it(tmp_path: Path, few: Path) -> None:
     assert row["exponent(3 s) verdict"] == "determined"
     assert "tan delta(0.333 rad/s) value" in row
     assert page.read_text().index("Model-free") < page.read_text().index("Quantity</th>")
-    assert page.read_text().count("limits over all linear samples") == 1

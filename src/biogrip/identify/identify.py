@@ -58,8 +58,6 @@ _TERMS = 2
 _ROUNDING = 1e-6
 # Each of the others would take half a second to five; they are tried where the config names them.
 _POWER_LAWS = ["fractional_kelvin_voigt", "fractional_maxwell"]
-# Size, over the noise, of a constant of any size.
-_ANY = 1e9
 _SAME_NETWORK = "liquid_drop", "zener_maxwell"
 
 
@@ -145,10 +143,11 @@ def _notes_on_trace(judged: Diagnosis, on_fit: list[Note], opinion: list[Note]) 
 
         start += notes_on_contact(judged)
     start = start or [*_notes_on_blocks(judged)] or notes_on_start(recording, experiment, judged)
-    yield from start
+    yield from (it if it.weight == HARMLESS else replace(it, about=doubts.SET_UP) for it in start)
     rounded = any(note.about == doubts.ROUNDED and note.weight == DOUBT for note in judged.notes)
-    # Beside another start, errors of rounding or gains an offset and a drift mean nothing.
-    if not (rounded or gains) and all(note.weight == HARMLESS for note in start):
+    # Beside another start, errors of rounding or gains that reject a fit they mean nothing.
+    other = *start, *(note for note in gains if note.weight == REJECTION)
+    if not rounded and all(note.weight == HARMLESS for note in other):
         yield from opinion
     yield from _note_flow(recording, experiment)
     if not rounded:
@@ -490,7 +489,8 @@ def _notes_on_blocks(judged: Diagnosis) -> Iterator[Note]:
     if not len(steps) or experiment.coloured or (judged.status == doubts.OK and not declared):
         return
     base = replace(experiment.to_identify(), offset=experiment.offset and not declared)
-    rows = base.in_noise(time_s, uncertain=_ANY * steps)
+    # Of any size, as so many noises.
+    rows = base.in_noise(time_s, uncertain=1e9 * steps)
     anew, whole, alone = (
         fit_any_sample(other.of(time_s, readings, condensed=condensed).residuals)
         for other, condensed in ((base, rows), (replace(base, offset=True), None), (base, None))

@@ -26,7 +26,7 @@ from biogrip.errors import BiogripError
 from biogrip.fit.any_sample import fit_responses
 from biogrip.fit.experiment import Experiment
 from biogrip.fit.problem import GeneRange
-from biogrip.judging.onset import OnsetFits, begins_constant, estimate_onset
+from biogrip.judging.onset import OnsetFits, begins_constant, estimate_onset, unsaid_end
 from biogrip.physics.fractional import LONGEST_S, SHORTEST_S
 from biogrip.physics.modes import lag_course
 from biogrip.physics.noise import (
@@ -355,7 +355,7 @@ def check_recording(recording: Recording, experiment: Experiment) -> str | None:
             f"{recording.extent(column)}: found no response to the {controlled}, but "
             f"{plain(trace.mean())}{unit} throughout, give or take {plain(trace.std(), 2)}{unit}; "
             f"allowed is a {read.name} from zero that follows the {controlled} and stands out of "
-            "the noise."
+            f"the noise.{unsaid_end(recording, experiment)}"
         )
     # An undeclared offset may look like the wrong sign.
     also = nuisance_basis(time_s, offset=True, drift=experiment.drift)

@@ -142,8 +142,7 @@ def tare_of(experiment: Experiment, recording: Recording) -> float:
     kept, off = _left_by_any([replace(posed, offset=True) for posed in both], *given)
     if kept <= off * np.exp(level if load[0, 0] >= start_s and not told else -level):
         return 0.0
-    bare = [replace(posed, offset=posed.offset and not told) for posed in both]
-    rest = _left_by_any(bare, *given)
+    rest = _left_by_any([replace(it, offset=it.offset and not told) for it in both], *given)
     left = off * np.exp(2 * level) if told else rest[1]
     return tare if left < rest[0] * np.exp(level) else 0.0
 

@@ -21,7 +21,7 @@ from biogrip.fit.problem import Fit, TraceProblem
 from biogrip.identify.data import judged_data, moduli_between
 from biogrip.judging.agreement import Agreement, compare_traces, shared_freedom
 from biogrip.judging.diagnosis import Diagnosis, lower_fit, profile_all, with_notes, with_times
-from biogrip.judging.doubts import REJECTED, REJECTION, Note, find_reasons, order_notes
+from biogrip.judging.doubts import REJECTED, REJECTION, SET_UP, Note, find_reasons, order_notes
 from biogrip.judging.likelihood import Likelihood, find_thresholds
 from biogrip.judging.without_model import KINDS, WithoutModel, tell_without_model
 from biogrip.physics.protocol import largest_load
@@ -161,8 +161,13 @@ def _compared(names: Sequence[str], agreement: Agreement) -> str:
 
 
 def _differences(names: Sequence[str], diagnoses: Sequence[Diagnosis], agreement: Agreement) -> str:
-    """Say that traces do not agree, which differs, and whether that follows load or order."""
-    said = f"{_compared(names, agreement)} "
+    """Say that traces do not agree, which differs, and whether that follows load or order.
+
+    First comes what each by itself tells of its set-up, which may be why.
+    """
+    pairs = zip(names, diagnoses, strict=True)
+    own = (f"{name}: {it.text} " for name, one in pairs for it in one.notes if it.about == SET_UP)
+    said = f"{''.join(own)}{_compared(names, agreement)} "
     if agreement.odd is not None:
         said += f"Without {names[agreement.odd]} the others agree. "
     if not agreement.in_stiffness:

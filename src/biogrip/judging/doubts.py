@@ -46,8 +46,8 @@ HARMLESS, DOUBT, REJECTION = "harmless", "doubt", "rejection"
 OK, DOUBTFUL, REJECTED = "ok", "doubtful", "rejected"
 """Status of a fit by the heaviest of its notes."""
 
-ROUNDED, RING, NOT_LINEAR = "rounded", "ring", "not linear"
-"""What notes are about that others depend on."""
+ROUNDED, RING, NOT_LINEAR, SET_UP = "rounded", "ring", "not linear", "set-up"
+"""What notes are about that others depend on; the set-up is a start, a zero or a contact."""
 
 _STATUS = {HARMLESS: OK, DOUBT: DOUBTFUL, REJECTION: REJECTED}
 _WEIGHTS = tuple(_STATUS)
@@ -62,7 +62,7 @@ class Note:
     text: str
     """The sentence."""
     about: str = ""
-    """`ROUNDED`, `RING` or `NOT_LINEAR`, if it is about that."""
+    """`ROUNDED`, `RING`, `NOT_LINEAR` or `SET_UP`, if it is about that."""
 
 
 def compute_status(notes: Sequence[Note]) -> str:

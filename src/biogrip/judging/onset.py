@@ -16,7 +16,7 @@ cent. Linear approximations fail at the kinks.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -37,7 +37,7 @@ from biogrip.judging.profiles import Finding, compute_findings
 from biogrip.judging.whiteness import is_still
 from biogrip.physics.modes import lag_course
 from biogrip.physics.noise import estimate_noise, nuisance_basis, without
-from biogrip.physics.protocol import evaluate, spacing_at
+from biogrip.physics.protocol import evaluate, is_held, spacing_at
 from biogrip.physics.residuals import Residuals
 from biogrip.physics.response import compute_modes
 from biogrip.traces.reader import Recording
@@ -267,6 +267,8 @@ def notes_on_start(
         onset_s = estimate_onset(experiment, time_s, readings)
         if begins_constant(time_s, readings, onset_s):
             notes += _about_late_onset(OnsetFits(free, time_s, readings), diagnosis, onset_s)
+    if rejected and (how := unsaid_end(recording, experiment)):
+        notes.append(Note(REJECTION, f"Under a hold no sample reads that.{how}"))
     if ramped and not rejected and not notes:
         notes += _about_ramp(diagnosis, ramped, recorded=experiment.record is not None)
     followed = experiment.record is not None and not experiment.uncertainty.get("steps")
@@ -278,13 +280,23 @@ def notes_on_start(
     return notes
 
 
+def unsaid_end(recording: Recording, experiment: Experiment) -> str:
+    """Return a hint if readings fall under a hold, as no sample does; an outlier comes back."""
+    time_s, size = recording.time_s, np.abs(recording.readings)
+    falls = np.minimum(size[:-3], size[1:-2]) - np.maximum(size[2:-1], size[3:])
+    held = not experiment.torque.deforms and is_held(experiment.torque, time_s)
+    if not held or falls.max() < levels.OUTLYING * estimate_noise(recording.readings):
+        return ""
+    until = f"{time_s[1 + np.argmax(falls)] + (recording.onset_s or 0.0):g}"
+    return f" They fall after {until} s, as if nothing was held from there on: --until {until}."
+
+
 def _about_late_onset(fits: OnsetFits, diagnosis: Diagnosis, guess_s: float) -> Iterator[Note]:
     """Yield a note if a trace is constant up to an onset, with which it fits far better."""
     trace, noise_sd = (fits.time_s, fits.readings), fits.experiment.noise_sd
     given, needed = fits.at(0.0, diagnosis.likelihood.best), chdtri(1, levels.SURELY)
-    fall_to = partial(compute_fall, len(trace[0]), given.misfit, noise_sd=noise_sd)
     found = fits.best(guess_s)
-    fall = fall_to(found.misfit)
+    fall = compute_fall(len(trace[0]), given.misfit, found.misfit, noise_sd)
     if fall < needed or not begins_constant(*trace, found.onset_s):
         return
     fit = fits.posed(found.onset_s), found.log_parameters, found.misfit
@@ -321,8 +333,7 @@ def _about_load(diagnosis: Diagnosis) -> Iterator[Note]:
         options={"xatol": _ACCURACY_OF_CLOCK * spacing_s},
     ).x
     other = _at(given, late_s)
-    fall_from = partial(compute_fall, residuals.samples, after=other.misfit)
-    fall = fall_from(given.misfit, noise_sd=residuals.trace.known_noise)
+    fall = compute_fall(residuals.samples, given.misfit, other.misfit, residuals.trace.known_noise)
     values = _moved(diagnosis, [other.best], 0.5)
     if fall > needed and values and abs(late_s) < most_s - spacing_s:
         yield Note(

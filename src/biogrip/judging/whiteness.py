@@ -111,8 +111,7 @@ def _chance_of_less(observed: float, first: float, second: float, free: int, mos
     variance = 2 * (second - first**2 / free) / (free * (free + 2))
     share = mean / most
     weight = share * (1 - share) / (variance / most**2) - 1
-    chance = betainc(share * weight, (1 - share) * weight, min(max(observed / most, 0.0), 1.0))
-    return float(chance)
+    return float(betainc(share * weight, (1 - share) * weight, np.clip(observed / most, 0.0, 1.0)))
 
 
 def by_leverage(residual: Array, basis: Array) -> Array:

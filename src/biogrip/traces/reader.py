@@ -227,6 +227,10 @@ def read_recording(path: Path, columns: MeasurementBlock) -> Recording:
     form = {key: value for key, value in form.items() if value is not None}
     if load is None and not columns.instrument.has_jaws and len(parts) == 1:
         remarks += tuple(_about_rise(sheet, table, parts[0], columns))
+    before = places[0] and tables[places[0] - 1].common(columns) == len(columns.named)
+    if columns.has_tip and load is None and (before or not chosen[0]):
+        said = f"Block {places[0]}" if before else "What is in rows before these"
+        remarks += (f"{said} tells the zero and the approach: read it, too, with --load DEPTH.",)
     later = tuple(int(line) for part in parts[1:] for line in part.lines[:1])
     return replace(recording, form=form, load=load, remarks_before=remarks, later_blocks=later)
 
@@ -254,9 +258,8 @@ def _about_rise(
 ) -> Iterator[str]:
     """Yield a sentence if a column that is not read has a load that rises before it is held."""
     controlled, read = columns.instrument.controlled.name, columns.instrument.read.name
-    used = columns.named.values()
     for index, name in enumerate(table.names):
-        if name in used or not plain_name(name).lower().startswith(controlled):
+        if name in columns.named.values() or not plain_name(name).lower().startswith(controlled):
             continue
         loads = numbers_of(sheet, table, index)[part.chosen]
         level = np.median(loads[len(loads) // 2 :])
