@@ -288,7 +288,7 @@ def unsaid_end(recording: Recording, experiment: Experiment) -> str:
     if not held or falls.max() < levels.OUTLYING * estimate_noise(recording.readings):
         return ""
     until = f"{time_s[1 + np.argmax(falls)] + (recording.onset_s or 0.0):g}"
-    return f" They fall after {until} s, as if nothing was held from there on: --until {until}."
+    return f" Readings fall after {until} s, as if nothing was held from there on: --until {until}."
 
 
 def _about_late_onset(fits: OnsetFits, diagnosis: Diagnosis, guess_s: float) -> Iterator[Note]:
