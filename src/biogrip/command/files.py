@@ -104,7 +104,7 @@ def identify_files(
     written = [*zip(names, outputs, strict=False), ("--report", report), ("--csv", table)]
     read = [trace.trace for sample in asked for trace in sample.traces]
     check_outputs(written, [*files, *read, *filter(None, [config])])
-    drawn = bool(report or plot) and len(asked) <= MOST_DRAWN
+    drawn = len(asked) if (report or plot) and len(asked) <= MOST_DRAWN else 0
     outcome = _identify_traces(asked, outputs or None, drawn=drawn)
     if alone and outcome.refused:
         raise BiogripError(outcome.refused[names[0]])
@@ -148,13 +148,13 @@ def traces_of(
 
 
 def _identify_traces(
-    asked: Sequence[Asked], outputs: Sequence[Path] | None, *, drawn: bool
+    asked: Sequence[Asked], outputs: Sequence[Path] | None, *, drawn: int
 ) -> Outcome:
     """Identify traces in batches, several processes at once, and write a JSON file of each.
 
     What such files have of the same trace, settings and software is taken from there, but if
-    `drawn`, when there are pictures of each. Errors of those that fail are collected. Without JSON
-    files, as a job of a workflow, it is one batch.
+    `drawn`, the number of traces of which a page has pictures. Errors of those that fail are
+    collected. Without JSON files, as a job of a workflow, it is one batch.
     """
     if len(asked) <= 1 or outputs is None:
         return identify_batch(asked, outputs, drawn=drawn)
@@ -192,7 +192,7 @@ def _identify_traces(
     return every
 
 
-def _identify_jobs(jobs: Sequence[tuple[Asked, Path]], *, drawn: bool) -> Outcome:
+def _identify_jobs(jobs: Sequence[tuple[Asked, Path]], *, drawn: int) -> Outcome:
     asked, outputs = zip(*jobs, strict=True)
     return identify_batch(asked, outputs, drawn=drawn)
 
@@ -231,7 +231,7 @@ def _made_from(asked: Asked) -> str:
 
 
 def identify_batch(
-    asked: Sequence[Asked], outputs: Sequence[Path] | None, *, drawn: bool = False
+    asked: Sequence[Asked], outputs: Sequence[Path] | None, *, drawn: int = 0
 ) -> Outcome:
     """Identify the traces of one batch, see `identify_files`; None to write no JSON files."""
     alone = len(asked) == 1 and outputs is not None
@@ -268,11 +268,12 @@ def identify_batch(
                 write_result(outputs[index], data, made_from[index])
             if drawn:
                 # Imported here: loading Matplotlib takes long.
-                from biogrip.command.page import trace_pictures
+                from biogrip.command.page import MOST_OPEN, trace_pictures
 
                 # What is found counts without a picture, too.
                 with _caught(sample, {}):
-                    outcome.pictures[sample.name] = trace_pictures(diagnosis, data)
+                    pictures = trace_pictures(diagnosis, data, of_many=drawn > MOST_OPEN)
+                    outcome.pictures[sample.name] = pictures
     in_order = (sample.name for sample in asked if sample.name in refused)
     outcome.refused.update((name, refused[name]) for name in in_order)
     return outcome

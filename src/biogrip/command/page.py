@@ -43,16 +43,19 @@ from biogrip.terminal import visible_lines
 _STATUS_MARKS = {OK: "✓", DOUBTFUL: "!", REJECTED: "✕"}
 # The group of all traces, and most panels beside each other.
 _ALL, _MOST_PANELS = "all traces", 6
-# Most traces whose pictures are open, and printed.
-_MOST_OPEN = 3
+MOST_OPEN = 3
+"""Most traces whose pictures are open, printed, and stacked for a telephone."""
 # Size of the picture of a fit, which is read on a telephone, too.
 _FIT_IN = (4.4, 3.4)
 
 
-def trace_pictures(diagnosis: Diagnosis, data: Mapping[str, Any]) -> list[str]:
-    """Return pictures of a trace as data URLs: the fit with residuals; profiles, and stacked."""
+def trace_pictures(
+    diagnosis: Diagnosis, data: Mapping[str, Any], *, of_many: bool = False
+) -> list[str]:
+    """Return pictures of a trace as data URLs: the fit; profiles; and these stacked, of few."""
+    ways = (False,) if of_many else (False, True)
     with style.styled():
-        profiles = [draw_profiles_of(data, stacked=stacked) for stacked in (False, True)]
+        profiles = [draw_profiles_of(data, stacked=stacked) for stacked in ways]
     return [address(picture) for picture in (draw_best(diagnosis), *profiles)]
 
 
@@ -168,7 +171,7 @@ def write_page(outcome: Outcome, page: Path) -> None:
             names=list(dict.fromkeys(name for cells in copied.values() for name in cells)),
             shared=_as_yaml(shared),
             alike=shared == singles[0]["assumed"] if singles else True,
-            many=len(traces) > _MOST_OPEN,
+            many=len(traces) > MOST_OPEN,
             marks=_STATUS_MARKS,
             counts={
                 status: sum(data["fit"] == status for data in traces) for status in _STATUS_MARKS
