@@ -394,7 +394,8 @@ def compared(results: Results) -> ShownTable:
         "text describes and with the encoding that judges the claims. The "
         "paper's value from and to: what is printed so with the printed error. Errors of a run are "
         "absolute; their median has its 95 % interval. Near: within "
-        f"{NEAR:.0%} of the paper's value, with 95 % limits, by which the verdict is; limits "
+        f"{NEAR:.0%} of the paper's value. The 95 % limits of that share decide: from {MOST:.0%} "
+        f"on replicated, up to {FEW:.0%} not, between in part, across one undecided; limits "
         "are of seeds alone. Not identifiable: no trace determines the quantity."
     )
     return ShownTable(caption, _COMPARED_COLUMNS, rows)
