@@ -20,6 +20,8 @@ from biogrip.levels import CERTAIN
 
 # End of the axis of profiles, and ratio of the ends above which that of values is logarithmic.
 _HIGHEST_INCREASE, _LOGARITHMIC_FROM = 12.0, 5.0
+# Share of the distances beside it up to which a point is too close to be drawn, too.
+_APART = 0.1
 
 
 def draw_profiles_of(
@@ -79,11 +81,13 @@ def _curve(profile: dict[str, Any]) -> tuple[Array, Array]:
 
     They do not overshoot (Fritsch & Carlson 1980); the root turns a parabola into straight lines.
     """
-    # Rounding may have made neighbours equal.
-    values, places = np.unique(np.array(profile["values"]), return_index=True)
-    roots = np.sqrt(np.clip(np.array(profile["increases"])[places], 0.0, 4 * _HIGHEST_INCREASE))
-    dense = np.unique(np.concatenate([np.linspace(*pair, 6) for pair in pairwise(np.log(values))]))
-    return np.exp(dense), PchipInterpolator(np.log(values), roots)(dense) ** 2
+    logs, increases = np.log(profile["values"]), np.array(profile["increases"])
+    # Between close neighbours, as a limit beside a point, rounding is a step.
+    gaps = np.concatenate(([np.inf], np.diff(logs), [np.inf]))
+    apart = gaps[:-1] > _APART * np.minimum(np.append(np.inf, gaps[:-2]), gaps[1:])
+    logs, roots = logs[apart], np.sqrt(np.clip(increases[apart], 0.0, 4 * _HIGHEST_INCREASE))
+    dense = np.unique(np.concatenate([np.linspace(*pair, 6) for pair in pairwise(logs)]))
+    return np.exp(dense), PchipInterpolator(logs, roots)(dense) ** 2
 
 
 def _profile_limits(item: Mapping[str, Any]) -> tuple[float, float]:
