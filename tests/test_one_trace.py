@@ -166,6 +166,7 @@ OPTIONS = {
     "--noise-model coloured --noise 1e-6": "--noise: measurement.noise_rad: is that of white noise",
     "--sd sd_rad --noise 1e-6": "--noise: measurement.noise_rad: does not go with sd",
     "--set measurement.time_unit=ns": "column 'time_s': found the unit 'ns', allowed are s, ms",
+    "--set measurement.scale=0": "--set: measurement.scale: found 0, allowed is another number.",
     "--fix k=0": "--fix: fixed.k: found 0, allowed is at least 1e-18 and at most 1e+12 N/m.",
     "--reading strian=x": "--reading: measurement.strian: unknown key. Did you mean 'strain'?",
     "--reading strain=x": "--hold: is missing; allowed is the stress in Pa that was held",

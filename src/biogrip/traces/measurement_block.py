@@ -296,7 +296,7 @@ class MeasurementBlock(Block):
 
     def complaints(self) -> Iterator[Complaint]:
         """Find keys that are in conflict, and what a recorded trace lacks."""
-        given = {key: value for key, value in vars(self).items() if value not in (None, False)}
+        given = {key: it for key, it in vars(self).items() if it is not None and it is not False}
         for key in (key for key in KNOWN_NOISE if key in given and self.coloured):
             yield (key,), "is that of white noise; leave it out where noise_model is coloured."
         for key, other in _EITHER:
@@ -308,11 +308,12 @@ class MeasurementBlock(Block):
         for key in ("scale", "load_scale"):
             if given.get(key) == 0:
                 yield (key,), "found 0, allowed is another number."
+        used = {key for key, value in given.items() if value != 0}
         if self.file is None:
-            for key in (key for key in given if key not in _OF_ALL):
+            for key in (key for key in given if key in used - _OF_ALL):
                 yield (key,), "is only for a recorded trace, whose measurement has a file."
             return
-        yield from self._axis_complaints({*given})
+        yield from self._axis_complaints(used)
         yield from self._reading_complaints()
         if self.file != ARRAYS and (complaint := trace_file_problem(self.file)):
             yield ("file",), complaint
